@@ -1,0 +1,1 @@
+"""The harness: registry, runner, metrics, statistics, store, tables and the command line."""

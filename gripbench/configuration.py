@@ -1,0 +1,106 @@
+"""Read TOML into pydantic models; every mistake becomes one line with file, key and remedy."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic_core import ErrorDetails
+
+from gripbench.errors import InputError, nearest
+
+CONFIGS = Path(__file__).parent / "configs"
+"""Where the TOML files that ship with gripbench lie."""
+
+
+class Configuration(BaseModel):
+    """Base of every configuration: no unknown key, no NaN, nothing changes after reading."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=False)
+
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Return the content of a TOML file.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, unreadable, empty or not TOML.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read as text ({error})") from None
+    if not text.strip():
+        raise InputError(f"{path}: the file is empty")
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{path}: not valid TOML: {error}") from None
+
+
+def parse(model: type[Model], content: Mapping[str, Any], source: str | Path) -> Model:
+    """Return `content` as a `model`.
+
+    Parameters
+    ----------
+    model
+        The pydantic model to fill.
+    content
+        Keys and values, as read from a TOML file.
+    source
+        Name of the file, for the message.
+
+    Raises
+    ------
+    InputError
+        On the first mistake, with file, key, what was given and what is allowed.
+    """
+    try:
+        return model.model_validate(dict(content))
+    except ValidationError as error:
+        raise InputError(f"{source}: {_describe(model, error.errors()[0])}") from None
+
+
+def _describe(model: type[BaseModel], detail: ErrorDetails) -> str:
+    location = [str(part) for part in detail["loc"]]
+    key = ".".join(location) or "(file)"
+    message = detail["msg"].removeprefix("Value error, ")
+    message = message[:1].lower() + message[1:]
+    if detail["type"] == "extra_forbidden":
+        hint = nearest(location[-1], _keys_beside(model, location))
+        return f"unknown key '{key}': {hint}"
+    if detail["type"] == "missing":
+        return f"missing key '{key}'"
+    shown = "" if isinstance(detail["input"], Mapping) else f" (given {detail['input']!r})"
+    return f"key '{key}': {message}{shown}"
+
+
+def _keys_beside(model: type[BaseModel], location: list[str]) -> list[str]:
+    """Return the keys that are allowed where the last part of `location` stands."""
+    current: Any = model
+    for part in location[:-1]:
+        fields = getattr(current, "model_fields", None)
+        if fields is None or part not in fields:
+            continue  # a tag of a union or a key of a table: the model below it comes next
+        current = _model_in(fields[part].annotation)
+    return list(getattr(current, "model_fields", {}))
+
+
+def _model_in(annotation: Any) -> Any:
+    """Return the first pydantic model in a type annotation, such as `dict[str, Model]`."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    for argument in getattr(annotation, "__args__", ()):
+        found = _model_in(argument)
+        if found is not None:
+            return found
+    return None

@@ -1,0 +1,1 @@
+"""The world: vehicles, tyres, plants, roads, drivers, sensors and the Gymnasium environment."""

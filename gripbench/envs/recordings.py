@@ -1,0 +1,78 @@
+"""A recording: what one run of a scenario, or one log of a vehicle, left behind."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from gripbench.errors import UndeclaredChannelError, nearest
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Observations and truth of one run.
+
+    Attributes
+    ----------
+    scenario
+        Name of the scenario.
+    seed
+        Seed of the run.
+    vehicle
+        Values of the vehicle's parameters by name, SI units: what an engineer knows on paper.
+    observations
+        Structured array, shape (n,): `time` and every channel that a sensor of the scenario
+        gives. This is all that a method may see.
+    truth
+        Structured array, shape (n,): the plant's own values at the same times.
+    score_from
+        Samples before this time [s] do not count in any score.
+    termination
+        Why the run ended before its horizon; empty if it did not.
+    notes
+        Further facts of the run that a score may need (such as the time of a friction step).
+    """
+
+    scenario: str
+    seed: int
+    vehicle: dict[str, float]
+    observations: npt.NDArray[Any]
+    truth: npt.NDArray[Any]
+    score_from: float = 0.0
+    termination: str = ""
+    notes: dict[str, float] = field(default_factory=dict)
+
+
+def select_channels(observations: npt.NDArray[Any], channels: tuple[str, ...]) -> npt.NDArray[Any]:
+    """Return a copy of the observations that holds `time` and the given channels only.
+
+    Parameters
+    ----------
+    observations
+        Structured array, shape (n,).
+    channels
+        Names of the channels that a method declared.
+
+    Returns
+    -------
+    Structured array, shape (n,), with the fields `time`, then `channels` in their order.
+
+    Raises
+    ------
+    UndeclaredChannelError
+        If the observations lack a channel.
+    """
+    names = ("time", *channels)
+    present = observations.dtype.names or ()
+    for name in names:
+        if name not in present:
+            raise UndeclaredChannelError(
+                f"the recording has no channel '{name}': {nearest(name, present)}"
+            )
+    selected = np.empty(observations.shape, [(name, np.float64) for name in names])
+    for name in names:
+        selected[name] = observations[name]
+    return selected

@@ -1,0 +1,263 @@
+"""Sensors: what an instrument makes of the truth.
+
+The chain of one channel is: truth, delay, scale, bias and drift, noise, low-pass, quantisation,
+sampling. The same compiled function serves a whole recording and one sample of the Gymnasium
+environment, and every channel draws from a stream of its own, so that a sensor's errors do not
+depend on which other sensors there are.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Mapping
+from typing import Any
+
+import numba
+import numpy as np
+import numpy.typing as npt
+from pydantic import Field
+
+from gripbench.configuration import CONFIGS, Configuration, parse, read_toml
+from gripbench.envs.signals import NEW, record_type, signal
+from gripbench.errors import InputError, unknown
+
+_CHUNK = 1024  # random numbers are drawn ahead in blocks; the stream is the same for any size
+
+
+class Sensor(Configuration):
+    """Errors and sampling of one channel; an empty table is a perfect sensor.
+
+    Attributes
+    ----------
+    source
+        Truth that is measured; empty: the signal of the channel's own name.
+    bias, bias_std
+        Constant error, and the standard deviation of one that is drawn for each seed.
+    bias_walk
+        Drift of the bias: standard deviation after one second.
+    scale, scale_std
+        Scale factor, and the standard deviation of its error that is drawn for each seed.
+    noise_std
+        Standard deviation of white noise, one draw each sample.
+    noise_hold
+        Time [s] for which one draw of the noise is held; 0: a sample.
+    lowpass
+        Time constant [s] of a first-order low-pass behind the noise; 0: none.
+    quantisation
+        Step of the reading; 0: none.
+    rate
+        Samples a second, the reading is held between them and `<channel>_new` marks the new
+        ones; 0: every sample.
+    delay
+        Age [s] of the truth in a reading.
+    """
+
+    source: str = ""
+    bias: float = 0.0
+    bias_std: float = Field(default=0.0, ge=0.0)
+    bias_walk: float = Field(default=0.0, ge=0.0)
+    scale: float = Field(default=1.0, gt=0.0)
+    scale_std: float = Field(default=0.0, ge=0.0)
+    noise_std: float = Field(default=0.0, ge=0.0)
+    noise_hold: float = Field(default=0.0, ge=0.0)
+    lowpass: float = Field(default=0.0, ge=0.0)
+    quantisation: float = Field(default=0.0, ge=0.0)
+    rate: float = Field(default=0.0, ge=0.0)
+    delay: float = Field(default=0.0, ge=0.0, le=10.0)
+
+
+class _SuiteFile(Configuration):
+    name: str
+    description: str
+    sensors: dict[str, Sensor]
+
+
+def load_sensor_suite(name: str) -> dict[str, Sensor]:
+    """Return the sensors of a suite that ships with gripbench, by channel."""
+    files = {path.stem: path for path in (CONFIGS / "sensors").glob("*.toml")}
+    if name not in files:
+        raise unknown("sensor suite", name, files)
+    return parse(_SuiteFile, read_toml(files[name]), files[name]).sensors
+
+
+_SPEC = np.dtype(
+    [
+        ("column", np.int64),  # of the truth that is measured
+        ("bias", np.float64),
+        ("walk", np.float64),
+        ("scale", np.float64),
+        ("noise", np.float64),
+        ("noise_hold", np.float64),
+        ("lowpass", np.float64),
+        ("quantisation", np.float64),
+        ("rate", np.float64),
+        ("delay", np.int64),  # samples
+        ("output", np.int64),  # column of the reading
+        ("flag", np.int64),  # column of its `_new` flag, -1: none
+    ]
+)
+_STATE = np.dtype(
+    [
+        ("drift", np.float64),
+        ("noise", np.float64),
+        ("noise_index", np.float64),
+        ("filtered", np.float64),
+        ("reading", np.float64),
+        ("sample_index", np.float64),
+        ("time", np.float64),
+    ]
+)
+
+
+@numba.njit(cache=True, error_model="numpy", nogil=True)
+def _measure(k, truth, specs, states, history, noise, walk, out):  # type: ignore[no-untyped-def]
+    """Measure sample `k`: all arguments are rows of this sample, `history` a ring of the past."""
+    time = truth[0]
+    out[0] = time
+    length = history.shape[0]
+    for j in range(specs.shape[0]):
+        spec = specs[j]
+        state = states[j]
+        history[k % length, j] = truth[spec.column]
+        value = history[max(k - spec.delay, 0) % length, j]
+        elapsed = time - state.time if k > 0 else 0.0
+        state.time = time
+        state.drift += spec.walk * np.sqrt(elapsed) * walk[j]
+        index = np.floor(time / spec.noise_hold + 1e-9) if spec.noise_hold > 0.0 else float(k)
+        if k == 0 or index != state.noise_index:
+            state.noise_index = index
+            state.noise = spec.noise * noise[j]
+        value = spec.scale * value + spec.bias + state.drift + state.noise
+        if spec.lowpass > 0.0:
+            if k > 0:
+                share = -np.expm1(-elapsed / spec.lowpass)
+                value = state.filtered + share * (value - state.filtered)
+            state.filtered = value
+        if spec.quantisation > 0.0:
+            value = spec.quantisation * np.round(value / spec.quantisation)
+        if spec.rate > 0.0:
+            index = np.floor(time * spec.rate + 1e-9)
+            new = k == 0 or index != state.sample_index
+            if new:
+                state.sample_index = index
+                state.reading = value
+            value = state.reading
+            out[spec.flag] = 1.0 if new else 0.0
+        out[spec.output] = value
+
+
+@numba.njit(cache=True, error_model="numpy", nogil=True)
+def _measure_block(first, truth, specs, states, history, noise, walk, out):  # type: ignore[no-untyped-def]
+    for i in range(truth.shape[0]):
+        _measure(first + i, truth[i], specs, states, history, noise[i], walk[i], out[i])
+
+
+class SensorSuite:
+    """The sensors of one run.
+
+    Parameters
+    ----------
+    sensors
+        Sensor by channel.
+    truth_type
+        Structured type of the truth; its first field is `time`.
+    sample_time
+        Base sample time [s]; `None` when samples are not equally spaced (no delay then).
+    seed
+        Seed of the run.
+    """
+
+    def __init__(
+        self,
+        sensors: Mapping[str, Sensor],
+        truth_type: np.dtype[Any],
+        sample_time: float | None,
+        seed: int,
+    ) -> None:
+        truth_names = truth_type.names or ()
+        names = ["time"]
+        for channel, sensor in sensors.items():
+            signal(channel)
+            names.append(channel)
+            if sensor.rate > 0.0:
+                names.append(channel + NEW)
+        self.observation_type = record_type(names)
+        self._specs = np.zeros(len(sensors), _SPEC)
+        self._states = np.zeros(len(sensors), _STATE)
+        self._streams: list[tuple[np.random.Generator, np.random.Generator]] = []
+        for j, (channel, sensor) in enumerate(sensors.items()):
+            source = sensor.source or channel
+            if source not in truth_names:
+                raise InputError(f"sensors.{channel}: the plant gives no '{source}' to measure")
+            if sensor.delay > 0.0 and sample_time is None:
+                raise InputError(f"sensors.{channel}.delay needs equally spaced samples")
+            first, drawn, walked = np.random.SeedSequence(
+                [seed, zlib.crc32(channel.encode())]
+            ).spawn(3)
+            constant = np.random.default_rng(first).standard_normal(2)
+            self._streams.append((np.random.default_rng(drawn), np.random.default_rng(walked)))
+            spec = self._specs[j]
+            spec["column"] = truth_names.index(source)
+            spec["bias"] = sensor.bias + sensor.bias_std * constant[0]
+            spec["walk"] = sensor.bias_walk
+            spec["scale"] = sensor.scale + sensor.scale_std * constant[1]
+            spec["noise"] = sensor.noise_std
+            spec["noise_hold"] = sensor.noise_hold
+            spec["lowpass"] = sensor.lowpass
+            spec["quantisation"] = sensor.quantisation
+            spec["rate"] = sensor.rate
+            spec["delay"] = round(sensor.delay / sample_time) if sample_time else 0
+            spec["output"] = names.index(channel)
+            spec["flag"] = names.index(channel + NEW) if sensor.rate > 0.0 else -1
+        longest = int(self._specs["delay"].max(initial=0))
+        self._history = np.zeros((longest + 1, len(sensors)))
+        self._noise = np.zeros((_CHUNK, len(sensors)))
+        self._walk = np.zeros((_CHUNK, len(sensors)))
+        self._samples = 0
+
+    def observe(self, truth: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """Measure the next samples.
+
+        Parameters
+        ----------
+        truth
+            Structured array, shape (n,): the n samples that follow those already measured.
+
+        Returns
+        -------
+        Structured array, shape (n,), of `observation_type`.
+        """
+        rows = _as_matrix(truth)
+        observations = np.empty(len(truth), self.observation_type)
+        out = _as_matrix(observations)
+        done = 0
+        while done < len(truth):
+            at = self._samples % _CHUNK
+            if at == 0:
+                self._draw()
+            take = min(_CHUNK - at, len(truth) - done)
+            _measure_block(
+                self._samples,
+                rows[done : done + take],
+                self._specs,
+                self._states,
+                self._history,
+                self._noise[at : at + take],
+                self._walk[at : at + take],
+                out[done : done + take],
+            )
+            self._samples += take
+            done += take
+        return observations
+
+    def _draw(self) -> None:
+        for j, (noise, walk) in enumerate(self._streams):
+            if self._specs[j]["noise"] > 0.0:
+                self._noise[:, j] = noise.standard_normal(_CHUNK)
+            if self._specs[j]["walk"] > 0.0:
+                self._walk[:, j] = walk.standard_normal(_CHUNK)
+
+
+def _as_matrix(records: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
+    """View records of float64 fields as a matrix, one row a record."""
+    return records.view(np.float64).reshape(len(records), -1)

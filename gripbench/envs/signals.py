@@ -1,0 +1,254 @@
+"""The signal table: every channel of the project, declared once.
+
+Axes follow ISO 8855: x forward, y left, z up; angles are right-handed, so a positive pitch or
+road grade lowers the nose (downhill) and a positive yaw rate turns left. SI units and radians
+throughout.
+
+A signal has one name wherever it occurs: in the truth of a recording, in the observations that
+a sensor gives of it, and in the estimates of a method.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from gripbench.errors import unknown
+
+VARIANCE = "_variance"
+"""Suffix of the estimate that holds the variance of another estimate."""
+
+NEW = "_new"
+"""Suffix of the flag that is 1 when a held channel carries a new sample, else 0."""
+
+
+@dataclass(frozen=True)
+class Signal:
+    """One channel.
+
+    Attributes
+    ----------
+    name
+        Unique name.
+    unit
+        SI unit, `-` where there is none.
+    frame
+        Axes in which the signal is resolved.
+    sign
+        What a positive value means.
+    instrument
+        What measures it in a vehicle; empty for a quantity that is truth or estimate only;
+        `idealised` for one that no sensor in a vehicle gives.
+    description
+        What it is.
+    shape
+        Shape of one sample; every signal is a scalar.
+    """
+
+    name: str
+    unit: str
+    frame: str
+    sign: str
+    instrument: str
+    description: str
+    shape: tuple[int, ...] = ()
+
+    @property
+    def idealised(self) -> bool:
+        """Whether no sensor in a vehicle gives this channel."""
+        return self.instrument == IDEALISED
+
+
+IDEALISED = "idealised"
+WHEEL_SPEED_SENSOR = "wheel speed sensor"
+TORQUE_ON_BUS = "torque on the vehicle bus"
+ACCELEROMETER = "accelerometer"
+GPS = "GPS receiver"
+GRADE_ESTIMATE = "road grade estimate"
+BANK_MAP = "road bank map"
+GYROSCOPE = "gyroscope"
+SPEED_SENSOR = "optical speed sensor"
+MAGNETOMETER = "magnetometer"
+STEERING_SENSOR = "steering angle sensor"
+
+_LONGITUDINAL = (
+    Signal("time", "s", "-", "-", "clock", "Time of the sample"),
+    Signal(
+        "wheel_speed_front", "rad/s", "wheel", "rolling forward", WHEEL_SPEED_SENSOR,
+        "Angular velocity of the front axle's wheels",
+    ),
+    Signal(
+        "wheel_speed_rear", "rad/s", "wheel", "rolling forward", WHEEL_SPEED_SENSOR,
+        "Angular velocity of the rear axle's wheels",
+    ),
+    Signal(
+        "torque_front", "N m", "wheel", "driving forward, braking is negative", TORQUE_ON_BUS,
+        "Traction or brake torque on the front axle",
+    ),
+    Signal(
+        "torque_rear", "N m", "wheel", "driving forward, braking is negative", TORQUE_ON_BUS,
+        "Traction or brake torque on the rear axle",
+    ),
+    Signal(
+        "accel_x", "m/s^2", "vehicle", "forward", ACCELEROMETER,
+        "Specific force along x: rate of change of velocity less gravity's component",
+    ),
+    Signal(
+        "speed_gps", "m/s", "vehicle", "forward", GPS,
+        "Speed over ground along x",
+    ),
+    Signal(
+        "road_grade", "rad", "road", "downhill", GRADE_ESTIMATE,
+        "Inclination of the road along x",
+    ),
+    Signal(
+        "speed_x_rate", "m/s^2", "vehicle", "forward", IDEALISED,
+        "Rate of change of v_x without gravity's component",
+    ),
+    Signal(
+        "wheel_acceleration_front", "rad/s^2", "wheel", "spinning up", IDEALISED,
+        "Exact angular acceleration of the front axle's wheels",
+    ),
+    Signal(
+        "wheel_acceleration_rear", "rad/s^2", "wheel", "spinning up", IDEALISED,
+        "Exact angular acceleration of the rear axle's wheels",
+    ),
+    Signal("speed_x", "m/s", "vehicle", "forward", SPEED_SENSOR, "Longitudinal velocity v_x"),
+    Signal("slip_ratio_front", "-", "wheel", "driving", "", "Slip ratio of the front axle"),
+    Signal("slip_ratio_rear", "-", "wheel", "driving", "", "Slip ratio of the rear axle"),
+    Signal(
+        "force_x_front", "N", "wheel", "driving forward", "", "Longitudinal tyre force, front axle"
+    ),
+    Signal(
+        "force_x_rear", "N", "wheel", "driving forward", "", "Longitudinal tyre force, rear axle"
+    ),
+    Signal("mu_front", "-", "-", "-", "", "Available friction coefficient at the front axle"),
+    Signal("mu_rear", "-", "-", "-", "", "Available friction coefficient at the rear axle"),
+    Signal(
+        "utilisation", "-", "-", "-", "", "Share of the available friction that is used, |a|/(mu g)"
+    ),
+)  # fmt: skip
+
+_WHEELS = ("front_left", "front_right", "rear_left", "rear_right")
+
+_BODY = (
+    Signal("accel_y", "m/s^2", "vehicle", "left", ACCELEROMETER, "Specific force along y"),
+    Signal("accel_z", "m/s^2", "vehicle", "up", ACCELEROMETER, "Specific force along z, g at rest"),
+    Signal("roll_rate", "rad/s", "vehicle", "left side up", GYROSCOPE, "Angular velocity about x"),
+    Signal("pitch_rate", "rad/s", "vehicle", "nose down", GYROSCOPE, "Angular velocity about y"),
+    Signal("yaw_rate", "rad/s", "vehicle", "turning left", GYROSCOPE, "Angular velocity about z"),
+    Signal(
+        "steer_angle", "rad", "vehicle", "to the left", STEERING_SENSOR,
+        "Steering angle of the front wheels at the road",
+    ),
+    Signal(
+        "magnetic_field_x", "T", "vehicle", "forward", MAGNETOMETER, "Magnetic flux density along x"
+    ),
+    Signal(
+        "magnetic_field_y", "T", "vehicle", "left", MAGNETOMETER, "Magnetic flux density along y"
+    ),
+    Signal("magnetic_field_z", "T", "vehicle", "up", MAGNETOMETER, "Magnetic flux density along z"),
+    Signal("velocity_north", "m/s", "earth", "north", GPS, "Velocity over ground, north component"),
+    Signal("velocity_west", "m/s", "earth", "west", GPS, "Velocity over ground, west component"),
+    Signal("velocity_up", "m/s", "earth", "up", GPS, "Velocity over ground, upward component"),
+    Signal(
+        "gps_time", "s", "-", "-", GPS, "Time at which the reported velocity and course were true"
+    ),
+    Signal(
+        "course", "rad", "earth", "from north to west", GPS,
+        "Direction of the velocity over ground, within -pi to pi",
+    ),
+    Signal(
+        "road_bank", "rad", "road", "left side up", BANK_MAP, "Inclination of the road across x"
+    ),
+    Signal("yaw", "rad", "earth", "from north to west", "", "Heading of the x axis"),
+    Signal("roll", "rad", "earth", "left side up", "", "Roll angle of the body, bank included"),
+    Signal("pitch", "rad", "earth", "nose down", "", "Pitch angle of the body, grade included"),
+    Signal(
+        "suspension_roll", "rad", "road", "left side up", "", "Roll of the body against the road"
+    ),
+    Signal("position_x", "m", "earth", "north", "", "Position of the centre of gravity, north"),
+    Signal("position_y", "m", "earth", "west", "", "Position of the centre of gravity, west"),
+    Signal("speed_y", "m/s", "vehicle", "left", "", "Lateral velocity v_y"),
+    Signal("sideslip", "rad", "vehicle", "moving to the left", "", "Sideslip angle atan2(v_y, v_x)"),
+    Signal("mu", "-", "-", "-", "", "Available friction coefficient, mean of the four wheels"),
+    Signal("force_y_front", "N", "wheel", "left", "", "Lateral tyre force, front axle"),
+    Signal("force_y_rear", "N", "wheel", "left", "", "Lateral tyre force, rear axle"),
+    Signal("gyro_bias", "rad/s", "vehicle", "turning left", "", "Bias of the yaw rate gyroscope"),
+    Signal("mu_used", "-", "-", "-", "", "Used friction, mean of the four wheels"),
+)  # fmt: skip
+
+
+def _of_each_wheel() -> list[Signal]:
+    table = []
+    for wheel in _WHEELS:
+        place = wheel.replace("_", " ") + " wheel"
+        table += [
+            Signal(
+                f"wheel_speed_{wheel}", "rad/s", "wheel", "rolling forward", WHEEL_SPEED_SENSOR,
+                f"Angular velocity of the {place}",
+            ),
+            Signal(
+                f"torque_{wheel}", "N m", "wheel", "driving forward, braking is negative",
+                TORQUE_ON_BUS, f"Traction or brake torque on the {place}",
+            ),
+            Signal(
+                f"slip_ratio_{wheel}", "-", "wheel", "driving", "", f"Slip ratio of the {place}"
+            ),
+            Signal(
+                f"slip_angle_{wheel}", "rad", "wheel", "moving to the left", "",
+                f"Slip angle of the {place}: positive gives a force to the right",
+            ),
+            Signal(
+                f"force_x_{wheel}", "N", "wheel", "driving forward", "",
+                f"Longitudinal tyre force of the {place}",
+            ),
+            Signal(f"force_y_{wheel}", "N", "wheel", "left", "", f"Lateral tyre force, {place}"),
+            Signal(f"force_z_{wheel}", "N", "wheel", "up", "", f"Vertical load of the {place}"),
+            Signal(f"mu_{wheel}", "-", "-", "-", "", f"Available friction at the {place}"),
+            Signal(
+                f"mu_used_{wheel}", "-", "-", "-", "", f"Used friction of the {place}: force over load"
+            ),
+        ]  # fmt: skip
+    return table
+
+
+SIGNALS: dict[str, Signal] = {
+    signal.name: signal for signal in (*_LONGITUDINAL, *_BODY, *_of_each_wheel())
+}
+"""The signal table, by name."""
+
+
+def signal(name: str) -> Signal:
+    """Return a signal by name; variance and `_new` channels derive from their parent.
+
+    Raises
+    ------
+    InputError
+        If no such signal exists; the message names the nearest one.
+    """
+    if name in SIGNALS:
+        return SIGNALS[name]
+    if name.endswith(VARIANCE) and name.removesuffix(VARIANCE) in SIGNALS:
+        parent = SIGNALS[name.removesuffix(VARIANCE)]
+        unit = "-" if parent.unit == "-" else f"({parent.unit})^2"
+        return Signal(name, unit, parent.frame, "-", "", f"Variance of {parent.name}")
+    if name.endswith(NEW) and name.removesuffix(NEW) in SIGNALS:
+        parent = SIGNALS[name.removesuffix(NEW)]
+        return Signal(
+            name, "-", "-", "1: new sample, 0: held", parent.instrument, f"{parent.name} is new"
+        )
+    raise unknown("signal", name, SIGNALS)
+
+
+def record_type(names: Iterable[str]) -> np.dtype:
+    """Return the structured type with one float64 field a signal.
+
+    Parameters
+    ----------
+    names
+        Signal names, in the order of the fields.
+    """
+    return np.dtype([(signal(name).name, np.float64) for name in names])

@@ -1,0 +1,71 @@
+"""A simulation: one run of a scenario's plant, advanced sample by sample or in one loop."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+
+@dataclass(frozen=True)
+class Action:
+    """One input of a plant: its signal name, unit and range."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    description: str
+
+
+class Simulation(ABC):
+    """One run of a plant.
+
+    The Gymnasium environment calls `reset`, `drive` and `advance` once a sample; a recording is
+    made by `run`, one compiled loop. Both call the same compiled functions, so they give
+    identical bytes.
+
+    Attributes
+    ----------
+    actions
+        The plant's inputs, in the order of an action vector.
+    truth_type
+        Structured type of one sample of the truth, `time` first.
+    sample_time
+        Time [s] between samples; None where the integrator chooses them.
+    termination
+        Why the run ended before its horizon (a spin, a roll-over); empty while it goes on.
+    """
+
+    actions: ClassVar[tuple[Action, ...]]
+    truth_type: ClassVar[np.dtype[Any]]
+    termination: str = ""
+    sample_time: float | None
+
+    @abstractmethod
+    def reset(self, seed: int) -> npt.NDArray[Any]:
+        """Start a run; return its first sample, a structured array of shape (1,)."""
+
+    @abstractmethod
+    def drive(self) -> npt.NDArray[np.float64]:
+        """Return what the scenario's own driver commands next, shape (len(actions),)."""
+
+    @abstractmethod
+    def advance(self, action: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
+        """Hold an action for one sample time; return the sample at its end, shape (1,)."""
+
+    @abstractmethod
+    def run(self, seed: int) -> npt.NDArray[Any]:
+        """Run to the horizon or termination under the scenario's driver.
+
+        Returns
+        -------
+        Structured array, shape (n,): the truth at every sample, the first included.
+        """
+
+    def notes(self) -> dict[str, float]:
+        """Return facts of the run that a score may need, by name."""
+        return {}

@@ -1,0 +1,128 @@
+"""Vehicles: parameters as TOML, each value with its source, guesses marked.
+
+A vehicle file is a table of parameters, each `{ value = ..., source = "..." }`, with
+`guess = true` where no source gives the value::
+
+    name = "li2014"
+    description = "..."
+
+    [parameters]
+    mass = { value = 1298.9, source = "Table III" }
+
+Methods and plants name the parameters that they need; a vehicle need not give them all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Self
+
+from pydantic import model_validator
+
+from gripbench.configuration import CONFIGS, Configuration, parse, read_toml
+from gripbench.errors import InputError, nearest, unknown
+
+GRAVITY = 9.81
+"""Gravitational acceleration [m/s^2]."""
+
+
+@dataclass(frozen=True)
+class ParameterRange:
+    """What a vehicle parameter is and which values are possible."""
+
+    unit: str
+    low: float
+    high: float
+    description: str
+
+
+VEHICLE_PARAMETERS: dict[str, ParameterRange] = {
+    "mass": ParameterRange("kg", 0.1, 1e5, "Vehicle mass"),
+    "yaw_inertia": ParameterRange("kg m^2", 1e-4, 1e6, "Moment of inertia about z"),
+    "cg_to_front": ParameterRange("m", 0.01, 10.0, "Distance from centre of gravity to front axle"),
+    "cg_to_rear": ParameterRange("m", 0.01, 10.0, "Distance from centre of gravity to rear axle"),
+    "wheel_radius": ParameterRange("m", 0.01, 2.0, "Effective rolling radius"),
+    "wheel_inertia": ParameterRange("kg m^2", 1e-6, 100.0, "Moment of inertia of an axle's wheels"),
+    "drag": ParameterRange("kg/m", 0.0, 10.0, "Wind drag: force over speed squared"),
+    "rolling_resistance": ParameterRange("-", 0.0, 0.2, "Rolling resistance over weight"),
+    "longitudinal_stiffness": ParameterRange(
+        "N", 1.0, 1e7, "Tyre force over slip ratio at zero slip, one axle"
+    ),
+    "magic_b": ParameterRange("-", 0.1, 100.0, "Magic Formula stiffness factor B"),
+    "magic_c": ParameterRange("-", 0.5, 3.0, "Magic Formula shape factor C"),
+    "magic_e": ParameterRange("-", -20.0, 1.0, "Magic Formula curvature factor E"),
+}
+"""Every parameter that a vehicle file may give."""
+
+
+class Value(Configuration):
+    """One parameter's value with its source."""
+
+    value: float
+    source: str
+    guess: bool = False
+
+
+class Vehicle(Configuration):
+    """A vehicle as its file gives it."""
+
+    name: str
+    description: str
+    parameters: dict[str, Value]
+
+    @model_validator(mode="after")
+    def _check_parameters(self) -> Self:
+        for name, given in self.parameters.items():
+            if name not in VEHICLE_PARAMETERS:
+                raise ValueError(
+                    f"unknown vehicle parameter '{name}': {nearest(name, VEHICLE_PARAMETERS)}"
+                )
+            allowed = VEHICLE_PARAMETERS[name]
+            if not allowed.low <= given.value <= allowed.high:
+                raise ValueError(
+                    f"parameters.{name}.value is {given.value:g} {allowed.unit}; "
+                    f"allowed is {allowed.low:g} to {allowed.high:g}"
+                )
+        return self
+
+    def values(self) -> dict[str, float]:
+        """Return the parameters by name, SI units."""
+        return {name: given.value for name, given in self.parameters.items()}
+
+
+def require(vehicle: dict[str, float], names: tuple[str, ...], reader: str) -> dict[str, float]:
+    """Return the named parameters of a vehicle.
+
+    Raises
+    ------
+    InputError
+        If the vehicle does not give one of them.
+    """
+    for name in names:
+        if name not in vehicle:
+            raise InputError(f"{reader} needs the vehicle parameter '{name}', which is not given")
+    return {name: vehicle[name] for name in names}
+
+
+def vehicle_files() -> dict[str, Path]:
+    """Return the vehicle files that ship with gripbench, by vehicle name."""
+    return {path.stem: path for path in sorted((CONFIGS / "vehicles").glob("*.toml"))}
+
+
+def load_vehicle(name: str) -> Vehicle:
+    """Return a vehicle by the name of a file that ships, or by the path of a TOML file.
+
+    Raises
+    ------
+    InputError
+        If there is no such vehicle or its file has a mistake.
+    """
+    if name.endswith(".toml"):
+        path = Path(name)
+    else:
+        files = vehicle_files()
+        if name not in files:
+            raise unknown("vehicle", name, files)
+        path = files[name]
+    return parse(Vehicle, read_toml(path), path)

@@ -1,0 +1,88 @@
+"""The worlds: which plant simulates which scenario, and how a recording is made of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from gripbench.configuration import CONFIGS, parse, read_toml
+from gripbench.envs.longitudinal import LongitudinalScenario, LongitudinalSimulation
+from gripbench.envs.recordings import Recording
+from gripbench.envs.scenarios import Scenario
+from gripbench.envs.sensors import SensorSuite
+from gripbench.envs.simulation import Simulation
+from gripbench.envs.vehicles import Vehicle, load_vehicle
+from gripbench.errors import InputError, nearest, unknown
+
+
+@dataclass(frozen=True)
+class World:
+    """A kind of plant: the model of its scenario files and its simulation."""
+
+    scenario: type[Scenario]
+    simulation: Callable[..., Simulation]
+
+
+WORLDS: dict[str, World] = {
+    "longitudinal": World(LongitudinalScenario, LongitudinalSimulation),
+}
+"""Every world, by the name that scenario files use."""
+
+
+def scenario_files() -> dict[str, Path]:
+    """Return the scenario files that ship with gripbench, by scenario name."""
+    return {path.stem: path for path in sorted((CONFIGS / "scenarios").glob("*.toml"))}
+
+
+def load_scenario(name: str) -> Scenario:
+    """Return a scenario by the name of a file that ships, or by the path of a TOML file.
+
+    Raises
+    ------
+    InputError
+        If there is no such scenario or its file has a mistake.
+    """
+    if name.endswith(".toml"):
+        path = Path(name)
+    else:
+        files = scenario_files()
+        if name not in files:
+            raise unknown("scenario", name, files)
+        path = files[name]
+    content = read_toml(path)
+    world = content.get("world")
+    if world not in WORLDS:
+        raise InputError(f"{path}: key 'world' is {world!r}: {nearest(str(world), WORLDS)}")
+    return parse(WORLDS[world].scenario, content, path)
+
+
+def simulation_of(scenario: Scenario, vehicle: Vehicle | None = None) -> Simulation:
+    """Return the simulation of a scenario, with the scenario's own vehicle unless one is given."""
+    return WORLDS[scenario.world].simulation(scenario, vehicle or load_vehicle(scenario.vehicle))
+
+
+def record(scenario: Scenario, seed: int) -> Recording:
+    """Simulate a scenario once and measure it with the scenario's sensors.
+
+    Parameters
+    ----------
+    scenario
+        What to run.
+    seed
+        Seed of all randomness of the run; the same seed gives the same bytes.
+    """
+    vehicle = load_vehicle(scenario.vehicle)
+    simulation = simulation_of(scenario, vehicle)
+    truth = simulation.run(seed)
+    suite = SensorSuite(scenario.all_sensors(), simulation.truth_type, simulation.sample_time, seed)
+    return Recording(
+        scenario=scenario.name,
+        seed=seed,
+        vehicle=vehicle.values(),
+        observations=suite.observe(truth),
+        truth=truth,
+        score_from=scenario.score_from,
+        termination=simulation.termination,
+        notes=simulation.notes(),
+    )

@@ -1,0 +1,241 @@
+"""The contract between a method and everything that runs it.
+
+A method's mathematics is one function over records::
+
+    @compiled
+    def step(state, obs, params, est):
+        est.force_x_front = 0.5 * params.mass * obs.accel_x
+
+`obs` holds `time` and the channels that the method declared, `params` the vehicle parameters and
+the method's own parameters that it declared, `state` whatever it keeps between samples, `est` the
+estimates that it declared. Numba compiles the function; `step.py_func` is the plain Python that a
+debugger can enter.
+
+A plain class with `reset(vehicle, dt)` and `update(obs) -> dict`, and the attributes `name`,
+`sensors` and `estimates`, is a full citizen too; it only runs slower (see `Estimator`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Protocol, runtime_checkable
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+from gripbench.envs.signals import VARIANCE, record_type, signal
+from gripbench.envs.vehicles import require
+from gripbench.errors import InputError, UndeclaredChannelError, nearest, unknown
+from gripbench.methods import drivers
+
+
+def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile a function over records; division by zero gives inf or NaN as in NumPy."""
+    return numba.njit(cache=True, error_model="numpy", nogil=True)(function)  # type: ignore[no-any-return]
+
+
+@runtime_checkable
+class Estimator(Protocol):
+    """What every method is: the whole contract for a plain class."""
+
+    name: str
+    sensors: tuple[str, ...]
+    estimates: tuple[str, ...]
+
+    def reset(self, vehicle: Mapping[str, float], dt: float) -> None:
+        """Forget everything; `vehicle` is what is known on paper, `dt` the sample time [s]."""
+        ...
+
+    def update(self, obs: Mapping[str, float]) -> Mapping[str, float]:
+        """Take one sample, `time` and the declared channels; return the declared estimates."""
+        ...
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A tuning parameter of a method: a number with unit, default and allowed range."""
+
+    name: str
+    default: float
+    unit: str
+    description: str
+    low: float = -np.inf
+    high: float = np.inf
+
+
+class CompiledMethod:
+    """Base of the methods whose step is compiled.
+
+    A subclass is a declaration: class attributes say what it is, `step` holds its mathematics.
+
+    Parameters
+    ----------
+    variant
+        Named settings: `corrected` is the default of every parameter, the others are listed in
+        `variants`.
+    **overrides
+        Values of single parameters.
+
+    Attributes
+    ----------
+    name
+        Unique name, lower case with underscores.
+    title
+        Name as the literature gives it.
+    reference
+        Paper and equations.
+    sensors
+        Channels that it reads besides `time`.
+    estimates
+        Signals that it writes.
+    variances
+        Those of `estimates` for which it also writes `<name>_variance`.
+    vehicle_parameters
+        Vehicle parameters that it reads.
+    parameters
+        Its own parameters.
+    variants
+        Settings by variant name: parameter values that differ from the default.
+    sensors_of
+        Channels by variant name, for a variant that reads other channels than `sensors`.
+    state
+        Structured type of what it keeps between samples; all zero after `reset`.
+    step
+        `step(state, obs, params, est) -> None`, compiled.
+    start
+        `start(state, params) -> None`, compiled, or None: first values of the state.
+    """
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    reference: ClassVar[str]
+    sensors: tuple[str, ...]
+    estimates: ClassVar[tuple[str, ...]]
+    variances: ClassVar[tuple[str, ...]] = ()
+    vehicle_parameters: ClassVar[tuple[str, ...]] = ()
+    parameters: ClassVar[tuple[Parameter, ...]] = ()
+    variants: ClassVar[Mapping[str, Mapping[str, float]]] = {}
+    sensors_of: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    state: ClassVar[np.dtype[Any]]
+    step: ClassVar[Callable[..., Any]]
+    start: ClassVar[Callable[..., Any] | None] = None
+
+    def __init__(self, variant: str = "corrected", **overrides: float) -> None:
+        settings = {parameter.name: parameter.default for parameter in self.parameters}
+        if variant != "corrected":
+            if variant not in self.variants:
+                raise unknown(f"variant of {self.name}", variant, ["corrected", *self.variants])
+            settings.update(self.variants[variant])
+        self.variant = variant
+        self.settings = _checked(self.name, self.parameters, settings, overrides)
+        self.sensors = self.sensors_of.get(variant, type(self).sensors)
+        self._types = _record_types(self)
+        self._records: drivers.Records | None = None
+
+    def reset(self, vehicle: Mapping[str, float], dt: float) -> None:
+        """Start afresh for a vehicle; `dt` is not used, every sample carries its time."""
+        self._records = self._fresh(vehicle, 1)
+
+    def update(self, obs: Mapping[str, float]) -> dict[str, float]:
+        """Take one sample and return the estimates.
+
+        Parameters
+        ----------
+        obs
+            `time` and the declared channels; others are not looked at.
+
+        Raises
+        ------
+        UndeclaredChannelError
+            If `obs` lacks a declared channel.
+        """
+        if self._records is None:
+            raise InputError(f"{self.name}: call reset(vehicle, dt) before update(obs)")
+        return drivers.online(self, self._records, obs)
+
+    def run(self, vehicle: Mapping[str, float], observations: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """Run over a whole recording in one compiled loop.
+
+        Parameters
+        ----------
+        vehicle
+            Vehicle parameters by name.
+        observations
+            Structured array, shape (n,), with `time` and at least the declared channels.
+
+        Returns
+        -------
+        Structured array, shape (n,), one field for each output.
+        """
+        return drivers.batch(self, self._fresh(vehicle, len(observations)), observations)
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Fields that a step writes: the estimates, then their variances."""
+        return (*self.estimates, *(name + VARIANCE for name in self.variances))
+
+    def _fresh(self, vehicle: Mapping[str, float], length: int) -> drivers.Records:
+        params = np.zeros(1, self._types.params)
+        for name, value in require(dict(vehicle), self.vehicle_parameters, self.name).items():
+            params[name] = value
+        for name, value in self.settings.items():
+            params[name] = value
+        records = drivers.Records(
+            state=np.zeros(1, self._types.state),
+            obs=np.zeros(1, self._types.obs),
+            params=params,
+            est=np.zeros(length, self._types.est),
+        )
+        if self.start is not None:
+            type(self).start(records.state[0], records.params[0])  # type: ignore[misc]
+        return records
+
+
+@dataclass(frozen=True)
+class _RecordTypes:
+    state: np.dtype[Any]
+    obs: np.dtype[Any]
+    params: np.dtype[Any]
+    est: np.dtype[Any]
+
+
+def _record_types(method: CompiledMethod) -> _RecordTypes:
+    for name in (*method.sensors, *method.estimates):
+        signal(name)
+    own = tuple(parameter.name for parameter in method.parameters)
+    clash = set(own) & set(method.vehicle_parameters)
+    if clash:
+        raise InputError(f"{method.name}: parameter '{clash.pop()}' is also a vehicle parameter")
+    params = [(name, np.float64) for name in (*method.vehicle_parameters, *own)]
+    return _RecordTypes(
+        state=method.state,
+        obs=record_type(("time", *method.sensors)),
+        params=np.dtype(params or [("none", np.float64)]),
+        est=record_type(method.outputs),
+    )
+
+
+def _checked(
+    name: str,
+    parameters: tuple[Parameter, ...],
+    settings: dict[str, float],
+    overrides: Mapping[str, float],
+) -> dict[str, float]:
+    known = {parameter.name: parameter for parameter in parameters}
+    for key in overrides:
+        if key not in known:
+            raise InputError(f"{name}: unknown parameter '{key}': {nearest(key, known)}")
+    settings = settings | dict(overrides)
+    for key, value in settings.items():
+        allowed = known[key]
+        if not (isinstance(value, int | float) and allowed.low <= value <= allowed.high):
+            raise InputError(
+                f"{name}: parameter '{key}' is {value!r}; "
+                f"allowed is {allowed.low:g} to {allowed.high:g} {allowed.unit}"
+            )
+    return {key: float(value) for key, value in settings.items()}
+
+
+__all__ = ["CompiledMethod", "Estimator", "Parameter", "UndeclaredChannelError", "compiled"]
