@@ -42,12 +42,21 @@ VEHICLE_PARAMETERS: dict[str, ParameterRange] = {
     "yaw_inertia": ParameterRange("kg m^2", 1e-4, 1e6, "Moment of inertia about z"),
     "cg_to_front": ParameterRange("m", 0.01, 10.0, "Distance from centre of gravity to front axle"),
     "cg_to_rear": ParameterRange("m", 0.01, 10.0, "Distance from centre of gravity to rear axle"),
+    "cg_height": ParameterRange("m", 0.01, 5.0, "Height of centre of gravity above the road"),
+    "track_front": ParameterRange("m", 0.05, 5.0, "Track: distance between the front wheels"),
+    "track_rear": ParameterRange("m", 0.05, 5.0, "Track: distance between the rear wheels"),
     "wheel_radius": ParameterRange("m", 0.01, 2.0, "Effective rolling radius"),
     "wheel_inertia": ParameterRange("kg m^2", 1e-6, 100.0, "Moment of inertia of an axle's wheels"),
     "drag": ParameterRange("kg/m", 0.0, 10.0, "Wind drag: force over speed squared"),
     "rolling_resistance": ParameterRange("-", 0.0, 0.2, "Rolling resistance over weight"),
     "longitudinal_stiffness": ParameterRange(
         "N", 1.0, 1e7, "Tyre force over slip ratio at zero slip, one axle"
+    ),
+    "cornering_stiffness_front": ParameterRange(
+        "N/rad", 1.0, 1e7, "Lateral tyre force over slip angle at zero slip, front axle"
+    ),
+    "cornering_stiffness_rear": ParameterRange(
+        "N/rad", 1.0, 1e7, "Lateral tyre force over slip angle at zero slip, rear axle"
     ),
     "magic_b": ParameterRange("-", 0.1, 100.0, "Magic Formula stiffness factor B"),
     "magic_c": ParameterRange("-", 0.5, 3.0, "Magic Formula shape factor C"),
