@@ -1,0 +1,334 @@
+"""The longitudinal world: scenarios of Li, Du & Li (2014) and their simulation."""
+
+from __future__ import annotations
+
+from math import sin
+from typing import Any, ClassVar, Literal, Self
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import Field, model_validator
+
+from gripbench.configuration import Configuration
+from gripbench.envs import longitudinal_integrators as integrators
+from gripbench.envs.longitudinal_paper_solver import STOP_EVERY, paper_solver, set_inputs
+from gripbench.envs.longitudinal_plant import (
+    INPUT_TYPE,
+    compiled,
+    derivatives,
+    plant_record,
+    tyre_force,
+)
+from gripbench.envs.profiles import Segment, breakpoints, profile_value, segment_records
+from gripbench.envs.scenarios import Scenario
+from gripbench.envs.signals import record_type
+from gripbench.envs.simulation import Action, Simulation
+from gripbench.envs.tyres import slip_ratio
+from gripbench.envs.vehicles import GRAVITY, Vehicle
+from gripbench.errors import GripbenchError
+
+PAPER_SOLVER = "paper"
+
+_FULL_TORQUE = 5000.0
+
+
+class TorqueDriver(Configuration):
+    """Torque [N m] on each axle over time; the rear axle follows the front unless given."""
+
+    front: tuple[Segment, ...]
+    rear: tuple[Segment, ...] | None = None
+
+
+class LongitudinalScenario(Scenario):
+    """A scenario of straight driving, wheels lumped to axles.
+
+    Attributes
+    ----------
+    initial_speed
+        Speed at the start [m/s]; the wheels roll without slip.
+    road_grade
+        Inclination [rad], positive downhill.
+    friction
+        Friction coefficient over time, both axles.
+    wheel_speed_noise
+        Process noise: relative standard deviation of the wheel speeds' jumps after each
+        millisecond; 0 in the paper's solver, whose own error takes its place.
+    driver
+        Torque profiles.
+    """
+
+    world: Literal["longitudinal"]
+    integrator: Literal["rodas3", "rk4", "paper"] = "rodas3"
+    initial_speed: float = Field(default=1.0, ge=0.0, le=100.0)
+    road_grade: float = Field(default=0.0, ge=-0.5, le=0.5)
+    friction: tuple[Segment, ...] = Field(min_length=1)
+    wheel_speed_noise: float = Field(default=0.0, ge=0.0, le=0.1)
+    driver: TorqueDriver
+
+    @model_validator(mode="after")
+    def _check_friction(self) -> Self:
+        for piece in self.friction:
+            for value in (piece.first, piece.last):
+                if not 0.01 <= value <= 2.0:
+                    raise ValueError(f"friction is {value:g}; allowed is 0.01 to 2")
+        covered = 0.0
+        for piece in sorted(self.friction, key=lambda s: s.start):
+            if piece.start != covered:
+                raise ValueError(f"friction has a gap or an overlap at {piece.start:g} s")
+            covered = piece.end
+        if covered < self.horizon:
+            raise ValueError(f"friction ends at {covered:g} s, before the horizon")
+        if self.integrator == PAPER_SOLVER and self.wheel_speed_noise > 0.0:
+            raise ValueError("wheel_speed_noise has no meaning with the paper's solver")
+        return self
+
+
+TRUTH_TYPE = record_type(
+    (
+        "time",
+        "speed_x",
+        "wheel_speed_front",
+        "wheel_speed_rear",
+        "slip_ratio_front",
+        "slip_ratio_rear",
+        "force_x_front",
+        "force_x_rear",
+        "mu_front",
+        "mu_rear",
+        "utilisation",
+        "torque_front",
+        "torque_rear",
+        "accel_x",
+        "speed_x_rate",
+        "wheel_acceleration_front",
+        "wheel_acceleration_rear",
+        "road_grade",
+    )
+)
+
+
+@compiled
+def _write_truth(time, x, inputs, plant, dx, truth):  # type: ignore[no-untyped-def]
+    derivatives(x, inputs, plant, dx)
+    truth.time = time
+    truth.speed_x = x[0]
+    truth.wheel_speed_front = x[1]
+    truth.wheel_speed_rear = x[2]
+    truth.slip_ratio_front = slip_ratio(plant.wheel_radius * x[1], x[0])
+    truth.slip_ratio_rear = slip_ratio(plant.wheel_radius * x[2], x[0])
+    truth.force_x_front = tyre_force(x[1], x[0], inputs.mu_front, plant.load_front, plant)
+    truth.force_x_rear = tyre_force(x[2], x[0], inputs.mu_rear, plant.load_rear, plant)
+    truth.mu_front = inputs.mu_front
+    truth.mu_rear = inputs.mu_rear
+    limit = inputs.mu_front * plant.load_front + inputs.mu_rear * plant.load_rear
+    truth.utilisation = abs(truth.force_x_front + truth.force_x_rear) / limit
+    truth.torque_front = inputs.torque_front
+    truth.torque_rear = inputs.torque_rear
+    truth.speed_x_rate = dx[0]
+    truth.accel_x = dx[0] - GRAVITY * sin(inputs.road_grade)
+    truth.wheel_acceleration_front = dx[1]
+    truth.wheel_acceleration_rear = dx[2]
+    truth.road_grade = inputs.road_grade
+
+
+@compiled
+def _advance(k, sample_time, x, step, inputs, plant, integrator, jumps, work, truth):  # type: ignore[no-untyped-def]
+    """Advance from sample `k` to the next; `jumps` are the wheel speeds' relative jumps at it."""
+    step = integrators.integrate(x, step, sample_time, inputs, plant, integrator, work)
+    x[1] *= 1.0 + jumps[0]
+    x[2] *= 1.0 + jumps[1]
+    _write_truth((k + 1) * sample_time, x, inputs, plant, work[10], truth)
+    return step
+
+
+@compiled
+def _command(k, sample_time, front, rear, friction, grade, inputs):  # type: ignore[no-untyped-def]
+    """Write what acts from sample `k` to the next: the profiles at the middle of the interval.
+
+    A held mean is exact for a constant and second-order accurate for a slope; a jump of a profile
+    that lies on a sample is met exactly.
+    """
+    set_inputs(inputs, (k + 0.5) * sample_time, front, rear, friction, grade)
+
+
+@compiled
+def _run(sample_time, x, step, inputs, plant, integrator, profiles, grade, jumps, work, truth):  # type: ignore[no-untyped-def]
+    front, rear, friction = profiles
+    for k in range(truth.shape[0] - 1):
+        _command(k, sample_time, front, rear, friction, grade, inputs[0])
+        step = _advance(
+            k, sample_time, x, step, inputs[0], plant[0], integrator, jumps[k], work, truth[k + 1]
+        )
+
+
+@compiled
+def _sampled_truth(times, states, inputs, plant, profiles, grade, work, truth):  # type: ignore[no-untyped-def]
+    front, rear, friction = profiles
+    for k in range(times.shape[0]):
+        set_inputs(inputs[0], times[k], front, rear, friction, grade)
+        _write_truth(times[k], states[k], inputs[0], plant[0], work[10], truth[k])
+
+
+class LongitudinalSimulation(Simulation):
+    """One run of a longitudinal scenario.
+
+    Parameters
+    ----------
+    scenario
+        What to run.
+    vehicle
+        The vehicle to run it with.
+    """
+
+    actions: ClassVar[tuple[Action, ...]] = (
+        Action("torque_front", "N m", -_FULL_TORQUE, _FULL_TORQUE, "Torque on the front axle"),
+        Action("torque_rear", "N m", -_FULL_TORQUE, _FULL_TORQUE, "Torque on the rear axle"),
+    )
+    truth_type = TRUTH_TYPE
+
+    def __init__(self, scenario: LongitudinalScenario, vehicle: Vehicle) -> None:
+        self.scenario = scenario
+        paper = scenario.integrator == PAPER_SOLVER
+        self.sample_time = None if paper else scenario.sample_time
+        self._integrator = -1 if paper else integrators.INTEGRATORS[scenario.integrator]
+        self._plant = plant_record(vehicle.values())
+        driver = scenario.driver
+        rear = driver.front if driver.rear is None else driver.rear
+        self._segments = (driver.front, rear, scenario.friction)
+        self._profiles = tuple(segment_records(part) for part in self._segments)
+        self._inputs = np.zeros(1, INPUT_TYPE)
+        self._work = integrators.scratch()
+        self._start()
+
+    def reset(self, seed: int) -> npt.NDArray[Any]:
+        """Start a run; return its first sample."""
+        if self.sample_time is None:
+            raise GripbenchError(
+                f"{self.scenario.name}: the paper's solver chooses its own steps and cannot be "
+                "advanced sample by sample; set integrator = 'rodas3'"
+            )
+        self._start()
+        self._jumps = _jump_stream(seed)
+        self._pending = np.empty((0, 2))
+        truth = np.zeros(1, TRUTH_TYPE)
+        self._set_start_inputs()
+        _write_truth(0.0, self._x, self._inputs[0], self._plant[0], self._work[10], truth[0])
+        return truth
+
+    def drive(self) -> npt.NDArray[np.float64]:
+        """Return the torques of the scenario's profiles for the next interval [N m]."""
+        front, rear, _ = self._profiles
+        middle = (self._k + 0.5) * self.scenario.sample_time
+        return np.array([profile_value(middle, front), profile_value(middle, rear)])
+
+    def advance(self, action: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
+        """Hold the axle torques [N m] for one sample time; return the sample at its end."""
+        sample_time = self.scenario.sample_time
+        front, rear, friction = self._profiles
+        inputs = self._inputs[0]
+        _command(self._k, sample_time, front, rear, friction, self.scenario.road_grade, inputs)
+        inputs["torque_front"], inputs["torque_rear"] = action
+        if len(self._pending) == 0:
+            self._pending = self._draw(1024)
+        truth = np.zeros(1, TRUTH_TYPE)
+        self._step = _advance(
+            self._k,
+            sample_time,
+            self._x,
+            self._step,
+            inputs,
+            self._plant[0],
+            self._integrator,
+            self._pending[0],
+            self._work,
+            truth[0],
+        )
+        self._pending = self._pending[1:]
+        self._k += 1
+        if not np.isfinite(self._x).all():
+            self.termination = "diverged"
+        return truth
+
+    def run(self, seed: int) -> npt.NDArray[Any]:
+        """Run to the horizon under the torque profiles; return the truth at every sample."""
+        if self.sample_time is None:
+            return self._run_paper_solver()
+        first = self.reset(seed)
+        truth = np.zeros(self.scenario.steps + 1, TRUTH_TYPE)
+        truth[0] = first[0]
+        _run(
+            self.scenario.sample_time,
+            self._x,
+            self._step,
+            self._inputs,
+            self._plant,
+            self._integrator,
+            self._profiles,
+            self.scenario.road_grade,
+            self._draw(self.scenario.steps),
+            self._work,
+            truth,
+        )
+        finite = np.isfinite(truth["speed_x"])
+        if not finite.all():
+            self.termination = "diverged"
+            truth = truth[: int(finite.argmin())]
+        return truth
+
+    def notes(self) -> dict[str, float]:
+        """Return the time [s] of the first friction step, if there is one."""
+        steps = sorted(piece.start for piece in self.scenario.friction)[1:]
+        return {"friction_step": steps[0]} if steps else {}
+
+    def _start(self) -> None:
+        speed = self.scenario.initial_speed
+        self._x = np.array([speed, *[speed / self._plant["wheel_radius"][0]] * 2])
+        self._step = 1e-5
+        self._k = 0
+        self.termination = ""
+
+    def _set_start_inputs(self) -> None:
+        """Set the inputs of the first sample: friction and grade, no torque yet."""
+        _, _, friction = self._profiles
+        nothing = friction[:0]
+        set_inputs(self._inputs[0], 0.0, nothing, nothing, friction, self.scenario.road_grade)
+
+    def _draw(self, n: int) -> npt.NDArray[np.float64]:
+        deviation = self.scenario.wheel_speed_noise * np.sqrt(self.scenario.sample_time / 1e-3)
+        if deviation == 0.0:
+            return np.zeros((n, 2))
+        return deviation * self._jumps.standard_normal((n, 2))
+
+    def _run_paper_solver(self) -> npt.NDArray[Any]:
+        self._start()
+        scenario = self.scenario
+        stops = {round(i * STOP_EVERY, 9) for i in range(1, int(scenario.horizon / STOP_EVERY) + 1)}
+        stops |= set().union(*(breakpoints(part) for part in self._segments), {scenario.horizon})
+        ordered = np.array(sorted(t for t in stops if 0.0 < t <= scenario.horizon))
+        capacity = 100_000
+        while True:
+            times, states = np.empty(capacity), np.empty((capacity, 3))
+            count = paper_solver(
+                self._x, ordered, self._inputs, self._plant, *self._profiles,
+                scenario.road_grade, times, states,
+            )  # fmt: skip
+            if count >= 0:
+                break
+            capacity *= 2
+        truth = np.zeros(count, TRUTH_TYPE)
+        _sampled_truth(
+            times[:count],
+            states[:count],
+            self._inputs,
+            self._plant,
+            self._profiles,
+            scenario.road_grade,
+            self._work,
+            truth,
+        )
+        return truth
+
+
+def _jump_stream(seed: int) -> np.random.Generator:
+    """Return the stream of the process noise: one of its own, apart from the sensors'."""
+    return np.random.default_rng(np.random.SeedSequence([seed, 0x57484545]))

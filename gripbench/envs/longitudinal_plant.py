@@ -1,0 +1,155 @@
+"""The longitudinal plant: Li, Du & Li (2014), eq. 2-6, one function of state and inputs.
+
+State: velocity v_x [m/s] and the angular velocities of the front and rear axle [rad/s].
+
+Errata and departures: one signed torque serves eq. 2 (traction) and eq. 3 (braking); below
+`HOLD_SPEED` the rolling resistance and the brake torque fade with speed, so that a vehicle comes
+to rest instead of being pushed backwards by its brakes; above it the equations are the printed
+ones. Table III's C_r = 1.5 is replaced in the vehicle's file.
+"""
+
+from __future__ import annotations
+
+from math import sin
+
+import numba
+import numpy as np
+
+from gripbench.envs.tyres import (
+    magic_formula,
+    magic_formula_slope,
+    slip_ratio,
+    slip_ratio_slopes,
+)
+from gripbench.envs.vehicles import GRAVITY, require
+
+HOLD_SPEED = 0.05
+"""Speed [m/s] below which resistances that oppose the motion fade to zero."""
+
+PLANT_PARAMETERS = (
+    "mass",
+    "cg_to_front",
+    "cg_to_rear",
+    "wheel_radius",
+    "wheel_inertia",
+    "drag",
+    "rolling_resistance",
+    "magic_b",
+    "magic_c",
+    "magic_e",
+)
+
+PLANT_TYPE = np.dtype(
+    [(name, np.float64) for name in (*PLANT_PARAMETERS, "load_front", "load_rear")]
+)
+
+INPUT_TYPE = np.dtype(
+    [
+        (name, np.float64)
+        for name in ("torque_front", "torque_rear", "mu_front", "mu_rear", "road_grade")
+    ]
+)
+"""What acts on the plant during one interval: axle torques [N m], friction, road grade [rad]."""
+
+compiled = numba.njit(cache=True, error_model="numpy", nogil=True)
+_inline = numba.njit(inline="always", error_model="numpy")
+
+
+def plant_record(vehicle: dict[str, float]) -> np.ndarray:
+    """Return the plant's parameters as a record array of length 1; static axle loads by eq. 6."""
+    given = require(vehicle, PLANT_PARAMETERS, "the longitudinal plant")
+    plant = np.zeros(1, PLANT_TYPE)
+    for name, value in given.items():
+        plant[name] = value
+    weight = given["mass"] * GRAVITY
+    wheelbase = given["cg_to_front"] + given["cg_to_rear"]
+    plant["load_front"] = weight * given["cg_to_rear"] / wheelbase
+    plant["load_rear"] = weight * given["cg_to_front"] / wheelbase
+    return plant
+
+
+@_inline
+def _fade(speed):  # type: ignore[no-untyped-def]
+    return max(-1.0, min(1.0, speed / HOLD_SPEED))
+
+
+@_inline
+def _fade_slope(speed):  # type: ignore[no-untyped-def]
+    return 1.0 / HOLD_SPEED if abs(speed) < HOLD_SPEED else 0.0
+
+
+@_inline
+def _wheel_torque(torque, wheel_speed, radius):  # type: ignore[no-untyped-def]
+    """Return the torque that acts: a brake (negative torque) only opposes the rotation."""
+    return torque if torque >= 0.0 else torque * _fade(wheel_speed * radius)
+
+
+@_inline
+def tyre_force(wheel_speed, speed, mu, load, plant):  # type: ignore[no-untyped-def]
+    """Return the longitudinal tyre force of an axle [N], eq. 4-5."""
+    slip = slip_ratio(plant.wheel_radius * wheel_speed, speed)
+    return mu * load * magic_formula(slip, plant.magic_b, plant.magic_c, plant.magic_e)
+
+
+@compiled
+def derivatives(x, inputs, plant, dx):  # type: ignore[no-untyped-def]
+    """Write the time derivative of the state, eq. 2-3.
+
+    Parameters
+    ----------
+    x
+        State, shape (3,).
+    inputs
+        Record of `INPUT_TYPE`.
+    plant
+        Record of `PLANT_TYPE`.
+    dx
+        Output, shape (3,).
+    """
+    force_front = tyre_force(x[1], x[0], inputs.mu_front, plant.load_front, plant)
+    force_rear = tyre_force(x[2], x[0], inputs.mu_rear, plant.load_rear, plant)
+    radius, inertia = plant.wheel_radius, plant.wheel_inertia
+    dx[0] = (
+        (force_front + force_rear) / plant.mass
+        - plant.rolling_resistance * GRAVITY * _fade(x[0])
+        - plant.drag * x[0] * abs(x[0]) / plant.mass
+        + GRAVITY * sin(inputs.road_grade)
+    )
+    dx[1] = (_wheel_torque(inputs.torque_front, x[1], radius) - force_front * radius) / inertia
+    dx[2] = (_wheel_torque(inputs.torque_rear, x[2], radius) - force_rear * radius) / inertia
+
+
+@_inline
+def _force_slopes(wheel_speed, speed, mu, load, plant):  # type: ignore[no-untyped-def]
+    rolling = plant.wheel_radius * wheel_speed
+    slip = slip_ratio(rolling, speed)
+    _, slope = magic_formula_slope(slip, plant.magic_b, plant.magic_c, plant.magic_e)
+    to_rolling, to_speed = slip_ratio_slopes(rolling, speed)
+    slope *= mu * load
+    return slope * to_rolling * plant.wheel_radius, slope * to_speed
+
+
+@_inline
+def _torque_slope(torque, wheel_speed, radius):  # type: ignore[no-untyped-def]
+    return 0.0 if torque >= 0.0 else torque * radius * _fade_slope(wheel_speed * radius)
+
+
+@compiled
+def jacobian(x, inputs, plant, jac):  # type: ignore[no-untyped-def]
+    """Write the Jacobian of `derivatives`, shape (3, 3): an arrow, the axles do not couple."""
+    front_w, front_v = _force_slopes(x[1], x[0], inputs.mu_front, plant.load_front, plant)
+    rear_w, rear_v = _force_slopes(x[2], x[0], inputs.mu_rear, plant.load_rear, plant)
+    radius, inertia = plant.wheel_radius, plant.wheel_inertia
+    jac[0, 0] = (
+        (front_v + rear_v) / plant.mass
+        - plant.rolling_resistance * GRAVITY * _fade_slope(x[0])
+        - 2.0 * plant.drag * abs(x[0]) / plant.mass
+    )
+    jac[0, 1] = front_w / plant.mass
+    jac[0, 2] = rear_w / plant.mass
+    jac[1, 0] = -front_v * radius / inertia
+    jac[1, 1] = (_torque_slope(inputs.torque_front, x[1], radius) - front_w * radius) / inertia
+    jac[1, 2] = 0.0
+    jac[2, 0] = -rear_v * radius / inertia
+    jac[2, 1] = 0.0
+    jac[2, 2] = (_torque_slope(inputs.torque_rear, x[2], radius) - rear_w * radius) / inertia

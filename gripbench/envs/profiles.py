@@ -1,0 +1,61 @@
+"""Profiles over time as TOML gives them: pieces of line and sine, with jumps between them."""
+
+from __future__ import annotations
+
+from math import pi, sin
+from typing import Self
+
+import numba
+import numpy as np
+import numpy.typing as npt
+from pydantic import Field, model_validator
+
+from gripbench.configuration import Configuration
+
+SEGMENT_TYPE = np.dtype(
+    [(name, np.float64) for name in ("start", "end", "first", "last", "amplitude", "period")]
+)
+
+
+class Segment(Configuration):
+    """One piece: a line from `first` to `last`, plus `amplitude * sin(2 pi t / period)`.
+
+    Times are in seconds; the values have the unit of what the profile drives.
+    """
+
+    start: float = Field(ge=0.0)
+    end: float = Field(gt=0.0)
+    first: float = 0.0
+    last: float = 0.0
+    amplitude: float = 0.0
+    period: float = Field(default=1.0, gt=0.0)
+
+    @model_validator(mode="after")
+    def _check_order(self) -> Self:
+        if self.end <= self.start:
+            raise ValueError(f"end {self.end:g} s is not after start {self.start:g} s")
+        return self
+
+
+def segment_records(segments: tuple[Segment, ...]) -> npt.NDArray[np.void]:
+    """Return the pieces as a structured array; times that no piece covers have the value 0."""
+    rows = [(s.start, s.end, s.first, s.last, s.amplitude, s.period) for s in segments]
+    return np.array(rows, SEGMENT_TYPE)
+
+
+def breakpoints(segments: tuple[Segment, ...]) -> set[float]:
+    """Return the times at which a profile or its slope may jump."""
+    return {time for s in segments for time in (s.start, s.end)}
+
+
+@numba.njit(cache=True, error_model="numpy", nogil=True)
+def profile_value(time, segments):  # type: ignore[no-untyped-def]
+    """Return the value of a profile; at a jump, the value after it."""
+    value = 0.0
+    for i in range(segments.shape[0]):
+        piece = segments[i]
+        if piece.start <= time < piece.end:
+            share = (time - piece.start) / (piece.end - piece.start)
+            value += piece.first + (piece.last - piece.first) * share
+            value += piece.amplitude * sin(2.0 * pi * (time - piece.start) / piece.period)
+    return value
