@@ -177,6 +177,21 @@ _BODY = (
     Signal("force_y_front", "N", "wheel", "left", "", "Lateral tyre force, front axle"),
     Signal("force_y_rear", "N", "wheel", "left", "", "Lateral tyre force, rear axle"),
     Signal("gyro_bias", "rad/s", "vehicle", "turning left", "", "Bias of the yaw rate gyroscope"),
+    Signal("gyro_scale", "-", "vehicle", "-", "", "Scale factor of the yaw rate gyroscope"),
+    Signal(
+        "cornering_stiffness_front", "N/rad", "wheel", "-", "", "Cornering stiffness, front axle"
+    ),
+    Signal(
+        "cornering_stiffness_rear", "N/rad", "wheel", "-", "", "Cornering stiffness, rear axle"
+    ),
+    Signal(
+        "course_innovation", "rad", "earth", "from north to west", "",
+        "Last course reading less its prediction",
+    ),
+    Signal(
+        "yaw_rate_innovation", "rad/s", "vehicle", "turning left", "",
+        "Last yaw rate reading less its prediction",
+    ),
     Signal("mu_used", "-", "-", "-", "", "Used friction, mean of the four wheels"),
 )  # fmt: skip
 
