@@ -58,6 +58,27 @@ VEHICLE_PARAMETERS: dict[str, ParameterRange] = {
     "cornering_stiffness_rear": ParameterRange(
         "N/rad", 1.0, 1e7, "Lateral tyre force over slip angle at zero slip, rear axle"
     ),
+    "stiffness_load_exponent": ParameterRange(
+        "-", 0.0, 1.0, "Exponent of the tyre stiffness over wheel load"
+    ),
+    "roll_gradient": ParameterRange(
+        "rad s^2/m", 0.0, 0.05, "Steady suspension roll over lateral specific force"
+    ),
+    "roll_frequency": ParameterRange("rad/s", 1.0, 50.0, "Natural frequency of suspension roll"),
+    "roll_damping": ParameterRange("-", 0.05, 3.0, "Damping ratio of suspension roll"),
+    "roll_share_front": ParameterRange(
+        "-", 0.0, 1.0, "Share of the lateral load transfer that the front axle takes"
+    ),
+    "pitch_gradient": ParameterRange(
+        "rad s^2/m", 0.0, 0.05, "Steady suspension pitch over longitudinal specific force"
+    ),
+    "load_lag": ParameterRange("s", 0.005, 1.0, "Time constant of the wheel loads"),
+    "drive_share_front": ParameterRange("-", 0.0, 1.0, "Share of drive torque on the front axle"),
+    "brake_share_front": ParameterRange("-", 0.0, 1.0, "Share of brake torque on the front axle"),
+    "steer_limit": ParameterRange("rad", 0.01, 1.2, "Largest steering angle at the road"),
+    "steer_rate_limit": ParameterRange(
+        "rad/s", 0.01, 20.0, "Largest rate of the steering angle at the road"
+    ),
     "magic_b": ParameterRange("-", 0.1, 100.0, "Magic Formula stiffness factor B"),
     "magic_c": ParameterRange("-", 0.5, 3.0, "Magic Formula shape factor C"),
     "magic_e": ParameterRange("-", -20.0, 1.0, "Magic Formula curvature factor E"),
