@@ -8,6 +8,7 @@ from pathlib import Path
 
 from gripbench.configuration import CONFIGS, parse, read_toml
 from gripbench.envs.longitudinal import LongitudinalScenario, LongitudinalSimulation
+from gripbench.envs.planar import PlanarScenario, PlanarSimulation
 from gripbench.envs.recordings import Recording
 from gripbench.envs.scenarios import Scenario
 from gripbench.envs.sensors import SensorSuite
@@ -26,6 +27,7 @@ class World:
 
 WORLDS: dict[str, World] = {
     "longitudinal": World(LongitudinalScenario, LongitudinalSimulation),
+    "planar": World(PlanarScenario, PlanarSimulation),
 }
 """Every world, by the name that scenario files use."""
 

@@ -1,0 +1,331 @@
+"""The planar world: four wheels, combined slip, a road with bank and grade, and a driver."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar, Literal, Self
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import Field, field_validator, model_validator
+
+from gripbench.configuration import Configuration
+from gripbench.envs import planar_plant as plant
+from gripbench.envs.path_drivers import (
+    DRIVER,
+    MEMORY,
+    Driver,
+    Steering,
+    steering_angles,
+)
+from gripbench.envs.paths import Path, Turns, lay_path
+from gripbench.envs.planar_run import TERMINATIONS, act, begin, decide, roll_out
+from gripbench.envs.planar_truth import TRUTH
+from gripbench.envs.road import MagneticField, Road, disturb_field, lay_road, stream
+from gripbench.envs.scenarios import Scenario
+from gripbench.envs.simulation import Action, Simulation
+from gripbench.envs.tyres_combined import SHAPES
+from gripbench.envs.vehicles import Vehicle, require
+from gripbench.errors import InputError
+
+WHEELS = ("front_left", "front_right", "rear_left", "rear_right")
+
+_LARGEST_TORQUE = 6000.0
+
+PLANAR_PARAMETERS = (
+    "mass",
+    "yaw_inertia",
+    "cg_to_front",
+    "cg_to_rear",
+    "cg_height",
+    "track_front",
+    "track_rear",
+    "wheel_radius",
+    "wheel_inertia",
+    "drag",
+    "rolling_resistance",
+    "longitudinal_stiffness",
+    "cornering_stiffness_front",
+    "cornering_stiffness_rear",
+    "stiffness_load_exponent",
+    "roll_gradient",
+    "roll_frequency",
+    "roll_damping",
+    "roll_share_front",
+    "pitch_gradient",
+    "load_lag",
+    "drive_share_front",
+    "brake_share_front",
+    "steer_limit",
+    "steer_rate_limit",
+)
+"""Vehicle parameters that the planar plant needs."""
+
+
+class SpeedWave(Configuration):
+    """A sine on top of the speed that the driver holds."""
+
+    amplitude: float = Field(default=0.0, ge=0.0, description="[m/s]")
+    frequency: float = Field(default=0.08, gt=0.0, description="[Hz]")
+
+
+class PlanarScenario(Scenario):
+    """A scenario of the planar world; exactly one of `path` and `steering` is given.
+
+    Attributes
+    ----------
+    tyre
+        Shape of the tyre, see `gripbench.envs.tyres_combined`.
+    speed
+        Speed at the start, which the driver holds [m/s].
+    speed_wave
+        Sine on top of it.
+    path
+        Path that the driver follows.
+    steering
+        Open-loop steering.
+    driver
+        How the driver steers and holds the speed.
+    road, magnetic
+        The road, and the magnetic field over it.
+    stop_speed
+        The run ends below this speed [m/s]; 0: a stop does not end it.
+    off_road
+        The run ends so far beside the path [m].
+    """
+
+    world: Literal["planar"]
+    integrator: Literal["rk4"] = "rk4"
+    tyre: Literal["brush", "dugoff", "magic_formula"] = "brush"
+    speed: float = Field(ge=0.0, le=100.0)
+    speed_wave: SpeedWave = SpeedWave()
+    path: Path | None = None
+    steering: Steering | None = None
+    driver: Driver = Driver()
+    road: Road
+    magnetic: MagneticField = MagneticField()
+    stop_speed: float = Field(default=0.05, ge=0.0)
+    off_road: float = Field(default=15.0, gt=0.0)
+
+    @field_validator("sample_time")
+    @classmethod
+    def _check_sample_time(cls, value: float) -> float:
+        steps = value / plant.STEP
+        if steps < 1.0 - 1e-9 or abs(steps - round(steps)) > 1e-6:
+            raise ValueError(f"must be a multiple of the integration step, {plant.STEP:g} s")
+        return value
+
+    @model_validator(mode="after")
+    def _check_manoeuvre(self) -> Self:
+        if (self.path is None) == (self.steering is None):
+            raise ValueError("give either 'path' or 'steering'")
+        if self.speed_wave.amplitude > self.speed:
+            raise ValueError("speed_wave.amplitude is larger than speed")
+        if self.road.turn_bank > 0.0 and not isinstance(self.path, Turns):
+            raise ValueError("road.turn_bank needs a path of kind 'turns'")
+        return self
+
+
+class PlanarSimulation(Simulation):
+    """One run of the planar plant; see `Simulation`.
+
+    Parameters
+    ----------
+    scenario
+        What to run.
+    vehicle
+        Vehicle with every parameter of `PLANAR_PARAMETERS`.
+
+    Raises
+    ------
+    InputError
+        If the vehicle lacks a parameter or cannot roll over its own geometry.
+    """
+
+    actions: ClassVar[tuple[Action, ...]] = (
+        Action("steer_angle", "rad", -1.2, 1.2, "Steering angle to reach at the end of the sample"),
+        *(
+            Action(
+                f"torque_{wheel}",
+                "N m",
+                -_LARGEST_TORQUE,
+                _LARGEST_TORQUE,
+                "Drive torque, brake torque is negative",
+            )
+            for wheel in WHEELS
+        ),
+    )
+    truth_type: ClassVar[np.dtype[Any]] = TRUTH
+
+    def __init__(self, scenario: PlanarScenario, vehicle: Vehicle) -> None:
+        self._scenario = scenario
+        self.sample_time = scenario.sample_time
+        self._plant = plant_record(scenario.tyre, vehicle)
+        self._driver = _driver_record(scenario)
+        self._parts = round(scenario.sample_time / plant.STEP)
+        self._state = np.zeros(plant.STATES)
+        self._inputs = np.zeros(plant.INPUTS)
+        self._memory = np.zeros(MEMORY)
+        self._action = np.zeros(len(self.actions))
+        self._wheels = np.zeros((4, plant.WHEEL_COLUMNS))
+        self._work = np.zeros((3, plant.STATES))
+        self._sample = 0
+        self._jump_time = math.nan
+        self._field = np.array([scenario.magnetic.horizontal, scenario.magnetic.vertical])
+        self._limits = np.array([scenario.stop_speed, scenario.off_road])
+        time = np.arange(scenario.steps + 1) * scenario.sample_time
+        wave = scenario.speed_wave
+        self._planned = np.zeros((scenario.steps + 1, 2))
+        self._planned[:, 1] = scenario.speed + wave.amplitude * np.sin(
+            2.0 * math.pi * wave.frequency * time
+        )
+        if scenario.steering is not None:
+            self._planned[:, 0] = steering_angles(scenario.steering, time)
+
+    def reset(self, seed: int) -> npt.NDArray[Any]:
+        """Start a run; return its first sample, shape (1,)."""
+        scenario = self._scenario
+        self.termination = ""
+        self._sample = 0
+        self._jump_time = math.nan
+        self._heading = stream(seed, "heading").uniform(-math.pi, math.pi)
+        if scenario.path is None:
+            self._path = np.zeros((0, 4))
+        else:
+            self._path = lay_path(scenario.path, scenario.speed, seed)
+        longest = (scenario.speed + scenario.speed_wave.amplitude) * scenario.horizon + 200.0
+        ground = lay_road(scenario.road, self._path[:, 3], longest, seed)
+        self._friction, self._profile = ground.friction, ground.profile
+        self._disturbance = disturb_field(
+            scenario.magnetic, scenario.sample_time, scenario.steps + 1, seed
+        )
+        first = np.zeros(1, TRUTH)
+        begin(
+            scenario.speed,
+            self._state,
+            self._inputs,
+            self._plant,
+            self._friction,
+            self._profile,
+            self._memory,
+            self._action,
+            self._heading,
+            self._field,
+            self._disturbance,
+            self._wheels,
+            self._work,
+            first,
+            first.view(np.float64).reshape(1, -1),
+        )
+        return first
+
+    def drive(self) -> npt.NDArray[np.float64]:
+        """Return the driver's next action, shape (5,)."""
+        decide(
+            self._sample,
+            self._state,
+            self._inputs,
+            self._plant,
+            self._driver,
+            self._planned,
+            self._path,
+            self._memory,
+            self._action,
+        )
+        return self._action.copy()
+
+    def advance(self, action: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
+        """Hold an action for one sample time; return the sample at its end, shape (1,)."""
+        after = np.zeros(1, TRUTH)
+        self._sample += 1
+        code = act(
+            self._sample,
+            self._parts,
+            np.asarray(action, dtype=np.float64),
+            self._state,
+            self._inputs,
+            self._plant,
+            self._driver,
+            self._friction,
+            self._profile,
+            self._path,
+            self._memory,
+            self._limits,
+            self._heading,
+            self._field,
+            self._disturbance,
+            self._wheels,
+            self._work,
+            after,
+            after.view(np.float64).reshape(1, -1),
+            0,
+        )
+        self.termination = TERMINATIONS[code]
+        return after
+
+    def run(self, seed: int) -> npt.NDArray[Any]:
+        """Run to the horizon or termination under the scenario's driver."""
+        samples = np.zeros(self._scenario.steps + 1, TRUTH)
+        samples[0] = self.reset(seed)[0]
+        count, code = roll_out(
+            self._parts,
+            self._state,
+            self._inputs,
+            self._plant,
+            self._driver,
+            self._planned,
+            self._friction,
+            self._profile,
+            self._path,
+            self._memory,
+            self._action,
+            self._limits,
+            self._heading,
+            self._field,
+            self._disturbance,
+            self._wheels,
+            self._work,
+            samples,
+            samples.view(np.float64).reshape(len(samples), -1),
+        )
+        self.termination = TERMINATIONS[code]
+        truth = samples[:count]
+        jumped = np.flatnonzero(truth["mu"] != truth["mu"][0])
+        if self._scenario.road.mu_after > 0.0 and len(jumped):
+            self._jump_time = float(truth["time"][jumped[0]])
+        return truth
+
+    def notes(self) -> dict[str, float]:
+        """Return the time of the friction jump [s], if there was one."""
+        return {} if math.isnan(self._jump_time) else {"mu_jump_time": self._jump_time}
+
+
+def plant_record(tyre: str, vehicle: Vehicle) -> npt.NDArray[Any]:
+    """Return what the compiled plant needs of a vehicle, one record of `PLANT`."""
+    given = require(vehicle.values(), PLANAR_PARAMETERS, "the planar plant")
+    record = np.zeros(1, plant.PLANT)
+    for name, value in given.items():
+        if name in plant.PLANT.names:  # type: ignore[operator]
+            record[name] = value
+    record["spin_inertia"] = 0.5 * given["wheel_inertia"]
+    record["tyre_x"] = 0.5 * given["longitudinal_stiffness"]
+    record["tyre_y_front"] = 0.5 * given["cornering_stiffness_front"]
+    record["tyre_y_rear"] = 0.5 * given["cornering_stiffness_rear"]
+    record["load_exponent"] = given["stiffness_load_exponent"]
+    record["shape"] = SHAPES[tyre]
+    smallest = 0.25 * given["mass"] * given["wheel_radius"] ** 2 * 1e-4
+    if record["spin_inertia"][0] < smallest:
+        raise InputError(
+            f"vehicle parameter 'wheel_inertia' is {given['wheel_inertia']:g} kg m^2: "
+            f"too small for a wheel of radius {given['wheel_radius']:g} m under this mass; "
+            f"allowed is {2.0 * smallest:g} and above"
+        )
+    return record
+
+
+def _driver_record(scenario: PlanarScenario) -> npt.NDArray[Any]:
+    record = np.zeros(1, DRIVER)
+    for name, value in scenario.driver.model_dump().items():
+        record[name] = value
+    record["sample_time"] = scenario.sample_time
+    return record
