@@ -1,0 +1,280 @@
+"""Extended Kalman filter of Dakhlallah, Glaser, Mammar & Sebsadji (2008) on a Dugoff tyre.
+
+The four-wheel model with the states v_x, v_y and yaw rate is driven by steering angle, wheel
+speeds and the accelerations (for the wheel loads); longitudinal speed and yaw rate correct it. Out
+come sideslip (eq. 17), tyre forces and the used friction of each wheel (eq. 16): what the wheel
+draws from the road, not what the road has to offer.
+
+Errata, corrected by default; the parameter in brackets restores the printed form, `paper` all:
+
+- (1): psi is the yaw rate in the first two rows, its derivative in the third; the tyre forces of
+  the front axle turn with the steering angle.
+- (2), (4): 1 - |lambda| (`printed_slip`).
+- (5): lambda compares the rolling speed with the speed in the plane of the wheel.
+- (6): S_b is the full track. The text calls the 1.5 m of its table an axle length; read as half
+  of that (`load_transfer_track` 0.5), the transfer doubles.
+- (11): F is the Jacobian of f + g; that of f alone lacks the tyres (`printed_jacobian`).
+- (12): the correction starts from the forecast x(k|k-1), printed is x(k-1|k-1) twice
+  (`printed_update`); H is the Jacobian of h, not of f.
+
+The output v_x is a measurement of this filter, though none of the sensors that the paper lists
+gives it; here it is the channel of an optical speed sensor.
+"""
+
+from __future__ import annotations
+
+from math import atan2, cos, hypot, sin
+
+import numpy as np
+
+from gripbench.envs.vehicles import GRAVITY
+from gripbench.methods.contract import CompiledMethod, Parameter, compiled
+from gripbench.methods.dugoff_tyre import dugoff_force, dugoff_slips
+from gripbench.methods.kalman import correct_scalar, filter_type, predict_covariance
+
+DUGOFF_STATE = np.dtype(
+    [
+        ("filter", filter_type(3)),  # v_x, v_y, yaw rate
+        ("time", np.float64),
+        ("samples", np.float64),
+        ("rate", np.float64, (3,)),  # f(x, u), time derivative of the states
+        ("slope", np.float64, (3, 3)),  # df/dx
+        ("wheels", np.float64, (4, 3)),  # forces along and across the wheel, load [N]
+        ("rolling", np.float64, (4,)),  # wheel radius times wheel speed [m/s]
+        ("steer_angle", np.float64),
+        ("accel_x", np.float64),
+        ("accel_y", np.float64),
+    ]
+)
+"""State of the filter with the model's last evaluation; wheels fl, fr, rl, rr."""
+
+DUGOFF_PARAMETERS = (
+    Parameter("friction", 0.8, "-", "Friction coefficient that the tyre model assumes", 0.01, 2.0),
+    Parameter("speed_x_walk", 1e-2, "m^2/s^3", "Process noise of v_x", 0.0),
+    Parameter("speed_y_walk", 1e-2, "m^2/s^3", "Process noise of v_y", 0.0),
+    Parameter("yaw_rate_walk", 1e-3, "rad^2/s^3", "Process noise of the yaw rate", 0.0),
+    Parameter("speed_x_noise", 0.05, "m/s", "Noise of the speed sensor", 1e-9),
+    Parameter("yaw_rate_noise", 1.745e-3, "rad/s", "Noise of the yaw rate sensor", 1e-9),
+    Parameter("speed_y_std", 0.1, "m/s", "Standard deviation of v_y at the start", 0.0),
+    Parameter("lowest_speed", 2.0, "m/s", "Speed below which the slips are held at it", 0.1),
+    Parameter("correction", 1.0, "-", "0: the model alone, open loop", 0.0, 1.0),
+    Parameter("load_transfer_track", 1.0, "-", "Share of the track in eq. 6", 0.1, 2.0),
+    Parameter("printed_slip", 0.0, "-", "1: 1 - lambda in eq. 2 and 4", 0.0, 1.0),
+    Parameter("printed_jacobian", 0.0, "-", "1: F of eq. 11 without the tyres", 0.0, 1.0),
+    Parameter("printed_update", 0.0, "-", "1: eq. 12 from x(k-1|k-1)", 0.0, 1.0),
+)
+
+
+@compiled
+def evaluate(state, params):  # type: ignore[no-untyped-def]
+    """Evaluate the model at the state and the inputs in `state`: rate, slope and wheels."""
+    x = state.filter.x
+    rate, slope, wheels = state.rate, state.slope, state.wheels
+    base = params.cg_to_front + params.cg_to_rear
+    half = 0.5 * params.mass / base
+    pitch = half * params.cg_height * state.accel_x
+    stiffness_x = 0.5 * params.longitudinal_stiffness
+    rate[0], rate[1], rate[2] = x[2] * x[1], -x[2] * x[0], 0.0
+    slope[0, 0], slope[0, 1], slope[0, 2] = 0.0, x[2], x[1]
+    slope[1, 0], slope[1, 1], slope[1, 2] = -x[2], 0.0, -x[0]
+    slope[2, 0], slope[2, 1], slope[2, 2] = 0.0, 0.0, 0.0
+    for i in range(4):
+        front = i < 2
+        if front:
+            track, lx, other = params.track_front, params.cg_to_front, params.cg_to_rear
+            angle = state.steer_angle
+            stiffness_y = 0.5 * params.cornering_stiffness_front
+            load = half * other * GRAVITY - pitch
+        else:
+            track, lx, other = params.track_rear, -params.cg_to_rear, params.cg_to_front
+            angle = 0.0
+            stiffness_y = 0.5 * params.cornering_stiffness_rear
+            load = half * other * GRAVITY + pitch
+        side = 1.0 if i % 2 == 0 else -1.0  # left, right
+        arm = params.load_transfer_track * track
+        load -= side * 2.0 * half * other * params.cg_height * state.accel_y / arm
+        load = max(load, 0.0)
+        ly = side * 0.5 * track
+        c, s = cos(angle), sin(angle)
+        along_r, across_r = s * lx - c * ly, c * lx + s * ly
+        along = c * x[0] + s * x[1] + along_r * x[2]
+        across = c * x[1] - s * x[0] + across_r * x[2]
+        moving = 1.0 if along > params.lowest_speed else 0.0
+        along = max(along, params.lowest_speed)
+        rolling = max(state.rolling[i], 0.05 * along)  # a locked wheel has no finite slip
+        slip_x, slip_y, d_along, d_mixed, d_across = dugoff_slips(
+            rolling, along, across, params.printed_slip
+        )
+        force_x, force_y, xx, xy, yy = dugoff_force(
+            stiffness_x * slip_x, stiffness_y * slip_y, params.friction * load
+        )
+        wheels[i, 0], wheels[i, 1], wheels[i, 2] = force_x, force_y, load
+        body_x, body_y = c * force_x - s * force_y, s * force_x + c * force_y
+        rate[0] += body_x / params.mass
+        rate[1] += body_y / params.mass
+        rate[2] += (lx * body_y - ly * body_x) / params.yaw_inertia
+        d_along *= moving * stiffness_x
+        d_mixed *= moving * stiffness_y
+        d_across *= stiffness_y
+        x_along, x_across = xx * d_along + xy * d_mixed, xy * d_across
+        y_along, y_across = xy * d_along + yy * d_mixed, yy * d_across
+        for j in range(3):
+            if j == 0:
+                u, v = c, -s
+            elif j == 1:
+                u, v = s, c
+            else:
+                u, v = along_r, across_r
+            dx, dy = x_along * u + x_across * v, y_along * u + y_across * v
+            body_x, body_y = c * dx - s * dy, s * dx + c * dy
+            slope[0, j] += body_x / params.mass
+            slope[1, j] += body_y / params.mass
+            slope[2, j] += (lx * body_y - ly * body_x) / params.yaw_inertia
+
+
+@compiled
+def _predict(state, params, elapsed):  # type: ignore[no-untyped-def]
+    """Forward Euler step of eq. 11 from the model's last evaluation."""
+    filter = state.filter
+    x = filter.x
+    for i in range(3):
+        for j in range(3):
+            filter.F[i, j] = (1.0 if i == j else 0.0) + elapsed * state.slope[i, j]
+    if params.printed_jacobian > 0.0:
+        filter.F[0, 0], filter.F[0, 1], filter.F[0, 2] = 1.0, elapsed * x[2], elapsed * x[1]
+        filter.F[1, 0], filter.F[1, 1], filter.F[1, 2] = -elapsed * x[2], 1.0, -elapsed * x[0]
+        filter.F[2, 0], filter.F[2, 1], filter.F[2, 2] = 0.0, 0.0, 1.0
+    filter.Q[0, 0] = params.speed_x_walk * elapsed
+    filter.Q[1, 1] = params.speed_y_walk * elapsed
+    filter.Q[2, 2] = params.yaw_rate_walk * elapsed
+    predict_covariance(filter)
+    if params.printed_update == 0.0 or params.correction == 0.0:
+        for i in range(3):
+            x[i] += elapsed * state.rate[i]
+
+
+@compiled
+def _correct(state, obs, params):  # type: ignore[no-untyped-def]
+    filter = state.filter
+    x, h = filter.x, filter.h
+    h[0], h[1], h[2] = 1.0, 0.0, 0.0
+    correct_scalar(filter, obs.speed_x - x[0], params.speed_x_noise**2)
+    h[0], h[1], h[2] = 0.0, 0.0, 1.0
+    correct_scalar(filter, obs.yaw_rate - x[2], params.yaw_rate_noise**2)
+
+
+@compiled
+def _used(wheels, i):  # type: ignore[no-untyped-def]
+    """Return the used friction of a wheel, 0 for one in the air."""
+    if wheels[i, 2] <= 0.0:
+        return 0.0
+    return hypot(wheels[i, 0], wheels[i, 1]) / wheels[i, 2]
+
+
+@compiled
+def _step(state, obs, params, est):  # type: ignore[no-untyped-def]
+    filter = state.filter
+    x, P, wheels = filter.x, filter.P, state.wheels
+    if state.samples == 0.0:
+        x[0], x[2] = obs.speed_x, obs.yaw_rate
+        P[0, 0] = params.speed_x_noise**2
+        P[1, 1] = params.speed_y_std**2
+        P[2, 2] = params.yaw_rate_noise**2
+    else:
+        _predict(state, params, obs.time - state.time)
+        if params.correction > 0.0:
+            _correct(state, obs, params)
+    state.samples += 1.0
+    state.time = obs.time
+    state.steer_angle = obs.steer_angle
+    state.accel_x, state.accel_y = obs.accel_x, obs.accel_y
+    state.rolling[0] = params.wheel_radius * obs.wheel_speed_front_left
+    state.rolling[1] = params.wheel_radius * obs.wheel_speed_front_right
+    state.rolling[2] = params.wheel_radius * obs.wheel_speed_rear_left
+    state.rolling[3] = params.wheel_radius * obs.wheel_speed_rear_right
+    evaluate(state, params)
+
+    forward = max(x[0], params.lowest_speed)
+    square = forward * forward + x[1] * x[1]
+    est.speed_x, est.speed_y, est.yaw_rate = x[0], x[1], x[2]
+    est.sideslip = atan2(x[1], forward)
+    est.speed_x_variance, est.speed_y_variance, est.yaw_rate_variance = P[0, 0], P[1, 1], P[2, 2]
+    est.sideslip_variance = (
+        x[1] * x[1] * P[0, 0] - 2.0 * x[1] * forward * P[0, 1] + forward * forward * P[1, 1]
+    ) / (square * square)
+    est.force_x_front_left, est.force_y_front_left = wheels[0, 0], wheels[0, 1]
+    est.force_x_front_right, est.force_y_front_right = wheels[1, 0], wheels[1, 1]
+    est.force_x_rear_left, est.force_y_rear_left = wheels[2, 0], wheels[2, 1]
+    est.force_x_rear_right, est.force_y_rear_right = wheels[3, 0], wheels[3, 1]
+    est.force_z_front_left, est.force_z_front_right = wheels[0, 2], wheels[1, 2]
+    est.force_z_rear_left, est.force_z_rear_right = wheels[2, 2], wheels[3, 2]
+    est.mu_used_front_left = _used(wheels, 0)
+    est.mu_used_front_right = _used(wheels, 1)
+    est.mu_used_rear_left = _used(wheels, 2)
+    est.mu_used_rear_right = _used(wheels, 3)
+    est.mu_used = 0.25 * (
+        est.mu_used_front_left
+        + est.mu_used_front_right
+        + est.mu_used_rear_left
+        + est.mu_used_rear_right
+    )
+
+
+_WHEELS = ("front_left", "front_right", "rear_left", "rear_right")
+
+
+class DugoffEkf(CompiledMethod):
+    """Extended Kalman filter over the four-wheel model with Dugoff tyres."""
+
+    name = "dugoff_ekf"
+    title = "Dugoff EKF"
+    reference = "Dakhlallah, Glaser, Mammar & Sebsadji 2008, eq. 1-12, 16 and 17"
+    sensors = (
+        "speed_x",
+        "yaw_rate",
+        "steer_angle",
+        "accel_x",
+        "accel_y",
+        *(f"wheel_speed_{wheel}" for wheel in _WHEELS),
+    )
+    estimates = (
+        "sideslip",
+        "speed_x",
+        "speed_y",
+        "yaw_rate",
+        *(f"force_x_{wheel}" for wheel in _WHEELS),
+        *(f"force_y_{wheel}" for wheel in _WHEELS),
+        *(f"force_z_{wheel}" for wheel in _WHEELS),
+        *(f"mu_used_{wheel}" for wheel in _WHEELS),
+        "mu_used",
+    )
+    variances = ("sideslip", "speed_x", "speed_y", "yaw_rate")
+    vehicle_parameters = (
+        "mass",
+        "yaw_inertia",
+        "cg_to_front",
+        "cg_to_rear",
+        "cg_height",
+        "track_front",
+        "track_rear",
+        "wheel_radius",
+        "longitudinal_stiffness",
+        "cornering_stiffness_front",
+        "cornering_stiffness_rear",
+    )
+    parameters = DUGOFF_PARAMETERS
+    variants = {  # noqa: RUF012
+        "paper": {
+            "load_transfer_track": 0.5,
+            "printed_slip": 1.0,
+            "printed_jacobian": 1.0,
+            "printed_update": 1.0,
+        },
+        "paper_slip": {"printed_slip": 1.0},
+        "paper_load_transfer": {"load_transfer_track": 0.5},
+        "paper_jacobian": {"printed_jacobian": 1.0},
+        "paper_update": {"printed_update": 1.0},
+        "open_loop": {"correction": 0.0},
+    }
+    state = DUGOFF_STATE
+    step = staticmethod(_step)
