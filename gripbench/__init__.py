@@ -1,3 +1,68 @@
-"""gripbench: a benchmark of estimators of tyre-road friction and vehicle sideslip."""
+"""gripbench: a benchmark of estimators of tyre-road friction and vehicle sideslip.
+
+The names below are the stable Python interface; everything else may move between versions. They
+are imported when first used, so that `import gripbench` costs nothing.
+
+Examples
+--------
+>>> import gripbench
+>>> class Friction(gripbench.CompiledMethod): ...           # see examples/
+>>> gripbench.check_estimator(Friction)                     # doctest: +SKIP
+>>> rows = gripbench.run(suite="longitudinal", methods=[Friction], seeds=20)  # doctest: +SKIP
+>>> gripbench.summary(rows)                                 # doctest: +SKIP
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from gripbench.bench.api import run
+    from gripbench.bench.check import check_estimator
+    from gripbench.bench.registry import register
+    from gripbench.bench.store import read_rows
+    from gripbench.bench.summary import summary
+    from gripbench.envs.worlds import load_scenario, record
+    from gripbench.methods.contract import CompiledMethod, Estimator, Parameter, compiled
 
 __version__ = "0.1.0"
+
+DEFINED_IN = {
+    "CompiledMethod": "gripbench.methods.contract",
+    "Estimator": "gripbench.methods.contract",
+    "Parameter": "gripbench.methods.contract",
+    "check_estimator": "gripbench.bench.check",
+    "compiled": "gripbench.methods.contract",
+    "load_scenario": "gripbench.envs.worlds",
+    "read_rows": "gripbench.bench.store",
+    "record": "gripbench.envs.worlds",
+    "register": "gripbench.bench.registry",
+    "run": "gripbench.bench.api",
+    "summary": "gripbench.bench.summary",
+}
+"""The module behind each public name."""
+
+__all__ = [
+    "CompiledMethod",
+    "Estimator",
+    "Parameter",
+    "check_estimator",
+    "compiled",
+    "load_scenario",
+    "read_rows",
+    "record",
+    "register",
+    "run",
+    "summary",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name in DEFINED_IN:
+        return getattr(importlib.import_module(DEFINED_IN[name]), name)
+    raise AttributeError(f"module 'gripbench' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *DEFINED_IN])

@@ -1,0 +1,284 @@
+"""The cage: a process of its own for a method that did not ship with gripbench.
+
+The process loads the method, takes one recording after the other and answers with estimates. It
+is killed when a limit of time is passed, and cannot take more memory than allowed; whatever the
+method does to it (an endless loop, `os._exit`, a segmentation fault), only the cell that it was
+working on is lost, and the next cell gets a new process.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import os
+import random
+import signal as signals
+import subprocess
+import sys
+import threading
+import time
+from dataclasses import dataclass
+from multiprocessing.connection import Connection, Pipe
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from gripbench.bench.declarations import Declaration, Source, declaration_of, describe_error
+from gripbench.bench.execution import Outcome, SkippedError, execute
+from gripbench.errors import GripbenchError, InputError
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What one cell of an isolated method may take.
+
+    Attributes
+    ----------
+    time
+        Wall-clock time [s], loading included.
+    memory
+        Memory [bytes] beyond what the empty process has.
+    """
+
+    time: float = 60.0
+    memory: int = 2 * 1024**3
+
+
+class CellFailure(GripbenchError):  # noqa: N818 - a result of a cell, not a mistake of the harness
+    """A method failed; `status` says how."""
+
+    def __init__(self, status: str, reason: str) -> None:
+        super().__init__(reason)
+        self.status = status
+
+
+class Cage:
+    """A process that runs one method.
+
+    Parameters
+    ----------
+    source
+        The method.
+    limits
+        What a cell may take.
+    """
+
+    def __init__(self, source: Source, limits: Limits) -> None:
+        self.source = source
+        self.limits = limits
+        self._process: subprocess.Popen[bytes] | None = None
+        self._connection: Connection | None = None
+
+    def declare(self, variant: str, parameters: dict[str, Any]) -> Declaration:
+        """Return what the method declares."""
+        answer: Declaration = self._ask("declare", variant, parameters)
+        return answer
+
+    def execute(
+        self,
+        declaration: Declaration,
+        variant: str,
+        parameters: dict[str, Any],
+        vehicle: dict[str, float],
+        observations: npt.NDArray[Any],
+        period: float,
+        seed: int,
+    ) -> Outcome:
+        """Run the method over a recording.
+
+        Raises
+        ------
+        CellFailure
+            With status `failed`, `timeout` or `skipped` and the reason.
+        """
+        answer: Outcome = self._ask(
+            "execute", declaration, variant, parameters, vehicle, observations, period, seed
+        )
+        return answer
+
+    def close(self) -> None:
+        """End the process."""
+        if self._connection is not None:
+            self._connection.close()
+        if self._process is not None:
+            with contextlib.suppress(OSError):
+                self._process.kill()
+            self._process.wait()
+        self._process = self._connection = None
+
+    def _ask(self, *request: Any) -> Any:
+        deadline = time.monotonic() + self.limits.time
+        if self._process is None:
+            self._start()
+        connection = self._connection
+        assert connection is not None
+        try:
+            # Sending may block on a process that no longer reads: it counts against the limit.
+            with _Alarm(self, self.limits.time) as alarm:
+                connection.send(request)
+                ready = connection.poll(max(deadline - time.monotonic(), 0.0))
+                answer = connection.recv() if ready else None
+            if alarm.rang or not ready:
+                self.close()
+                raise CellFailure(
+                    "timeout", f"stopped after the time limit of {self.limits.time:g} s"
+                )
+        except (EOFError, OSError):
+            rang = alarm.rang
+            reason = self._last_words()
+            self.close()
+            if rang:
+                raise CellFailure(
+                    "timeout", f"stopped after the time limit of {self.limits.time:g} s"
+                ) from None
+            raise CellFailure("failed", reason) from None
+        except Exception as error:  # an answer that cannot be read
+            self.close()
+            raise CellFailure("failed", f"its answer cannot be read: {error}") from None
+        status, content = answer  # type: ignore[misc]
+        if status == "out of memory":
+            self.close()  # what it holds may never be given back
+            limit = self.limits.memory / 1024**2
+            raise CellFailure("failed", f"out of memory (limit {limit:.0f} MiB)")
+        if status != "ok":
+            raise CellFailure(status, content)
+        return content
+
+    def _start(self) -> None:
+        ours, theirs = Pipe()
+        environment = dict(os.environ)
+        environment["PYTHONPATH"] = os.pathsep.join(filter(None, sys.path))
+        for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+            environment.setdefault(name, "1")
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "gripbench.bench.cage", str(theirs.fileno())],
+            pass_fds=[theirs.fileno()],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            env=environment,
+        )
+        theirs.close()
+        self._connection = ours
+        ours.send((self.source, self.limits.memory))
+
+    def _last_words(self) -> str:
+        """Return how the process ended."""
+        assert self._process is not None
+        try:
+            code = self._process.wait(5.0)
+        except subprocess.TimeoutExpired:
+            return "its process closed the connection"
+        if code < 0:
+            with contextlib.suppress(ValueError):
+                return f"its process was killed by {signals.Signals(-code).name}"
+            return f"its process was killed by signal {-code}"
+        return f"its process exited with code {code}"
+
+
+class _Alarm:
+    """Kills a cage's process when a limit is passed, also while a pipe blocks."""
+
+    def __init__(self, cage: Cage, limit: float) -> None:
+        self.rang = False
+        self._cage = cage
+        self._timer = threading.Timer(limit + 0.5, self._ring)
+        self._timer.daemon = True
+
+    def __enter__(self) -> _Alarm:
+        self._timer.start()
+        return self
+
+    def __exit__(self, *details: object) -> None:
+        self._timer.cancel()
+
+    def _ring(self) -> None:
+        self.rang = True
+        process = self._cage._process
+        if process is not None:
+            with contextlib.suppress(OSError):
+                process.kill()
+
+
+def declare(source: Source, variant: str, parameters: dict[str, Any]) -> Declaration:
+    """Return what a method declares, without running its code in this process.
+
+    Raises
+    ------
+    InputError
+        If it cannot be loaded, or declares what is not possible.
+    """
+    cage = Cage(source, Limits())
+    try:
+        return cage.declare(variant, parameters)
+    except CellFailure as error:
+        text = str(error)
+        place = source.target.rstrip(":")
+        raise InputError(text if place.split(":")[0] in text else f"{place}: {text}") from None
+    finally:
+        cage.close()
+
+
+def _serve(descriptor: int) -> None:
+    """Answer requests until the parent goes away."""
+    connection = Connection(descriptor)
+    _die_with_parent()
+    source, memory = connection.recv()
+    _limit_memory(memory)
+    while True:
+        try:
+            request = connection.recv()
+        except (EOFError, OSError):
+            return
+        answer = _answer(source, request)
+        try:
+            connection.send(answer)
+        except MemoryError:
+            connection.send(("out of memory", ""))
+        except Exception as error:  # what it answers with cannot be pickled
+            connection.send(("failed", describe_error(error)))
+
+
+def _answer(source: Source, request: tuple[Any, ...]) -> tuple[str, Any]:
+    try:
+        if request[0] == "declare":
+            _, variant, parameters = request
+            return "ok", declaration_of(source.make(variant, parameters), variant, parameters)
+        _, declaration, variant, parameters, vehicle, observations, period, seed = request
+        # A method may draw from the global generators: the same numbers in any order of cells.
+        random.seed(seed)
+        np.random.seed(seed % 2**32)  # noqa: NPY002
+        method = source.make(variant, parameters)
+        outcome = execute(method, declaration, vehicle, observations, period, timed=True)
+        estimates = np.asarray(outcome.estimates)
+        return "ok", Outcome(estimates, outcome.runtime)
+    except SkippedError as error:
+        return "skipped", str(error)
+    except MemoryError:
+        return "out of memory", ""
+    except BaseException as error:  # SystemExit too: the process goes on to the next cell
+        return "failed", describe_error(error)
+
+
+def _limit_memory(memory: int) -> None:
+    try:
+        import resource
+    except ImportError:  # not on this system
+        return
+    with contextlib.suppress(OSError, ValueError):
+        with open("/proc/self/statm", encoding="ascii") as file:
+            used = int(file.read().split()[0]) * resource.getpagesize()
+        resource.setrlimit(resource.RLIMIT_AS, (used + memory, used + memory))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+def _die_with_parent() -> None:
+    """Ask Linux to kill this process with its parent, however that one ends."""
+    if sys.platform == "linux":
+        with contextlib.suppress(OSError, AttributeError):
+            ctypes.CDLL(None).prctl(1, signals.SIGKILL)
+
+
+if __name__ == "__main__":
+    _serve(int(sys.argv[1]))
