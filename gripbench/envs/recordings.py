@@ -12,6 +12,27 @@ from gripbench.errors import UndeclaredChannelError, nearest
 
 
 @dataclass(frozen=True)
+class Bounds:
+    """What is known of a signal where no instrument gave it: it lay within an interval.
+
+    Attributes
+    ----------
+    signal
+        Name of the signal.
+    low, high
+        The interval, SI units; one side may be infinite.
+    start, end
+        When it holds [s].
+    """
+
+    signal: str
+    low: float
+    high: float
+    start: float = -np.inf
+    end: float = np.inf
+
+
+@dataclass(frozen=True)
 class Recording:
     """Observations and truth of one run.
 
@@ -34,6 +55,10 @@ class Recording:
         Why the run ended before its horizon; empty if it did not.
     notes
         Further facts of the run that a score may need (such as the time of a friction step).
+    windows
+        Named lists of intervals [s], such as `train` and `test`; empty for a simulated run.
+    bounds
+        Intervals in which signals are known to lie where the truth is not known.
     """
 
     scenario: str
@@ -44,10 +69,12 @@ class Recording:
     score_from: float = 0.0
     termination: str = ""
     notes: dict[str, float] = field(default_factory=dict)
+    windows: dict[str, tuple[tuple[float, float], ...]] = field(default_factory=dict)
+    bounds: tuple[Bounds, ...] = ()
 
 
 def select_channels(observations: npt.NDArray[Any], channels: tuple[str, ...]) -> npt.NDArray[Any]:
-    """Return a copy of the observations that holds `time` and the given channels only.
+    """Return a copy of the observations that holds the given channels and `time` only.
 
     Parameters
     ----------
@@ -58,14 +85,14 @@ def select_channels(observations: npt.NDArray[Any], channels: tuple[str, ...]) -
 
     Returns
     -------
-    Structured array, shape (n,), with the fields `time`, then `channels` in their order.
+    Structured array, shape (n,), with the fields `channels` in their order, then `time`.
 
     Raises
     ------
     UndeclaredChannelError
         If the observations lack a channel.
     """
-    names = ("time", *channels)
+    names = (*channels, "time")
     present = observations.dtype.names or ()
     for name in names:
         if name not in present:

@@ -100,6 +100,8 @@ class CompiledMethod:
         Settings by variant name: parameter values that differ from the default.
     sensors_of
         Channels by variant name, for a variant that reads other channels than `sensors`.
+    steps_of
+        Steps by variant name, for a variant that needs another one than `step`.
     state
         Structured type of what it keeps between samples; all zero after `reset`.
     step
@@ -118,8 +120,9 @@ class CompiledMethod:
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     variants: ClassVar[Mapping[str, Mapping[str, float]]] = {}
     sensors_of: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    steps_of: ClassVar[Mapping[str, Callable[..., Any]]] = {}
     state: ClassVar[np.dtype[Any]]
-    step: ClassVar[Callable[..., Any]]
+    step: Callable[..., Any]
     start: ClassVar[Callable[..., Any] | None] = None
 
     def __init__(self, variant: str = "corrected", **overrides: float) -> None:
@@ -131,6 +134,7 @@ class CompiledMethod:
         self.variant = variant
         self.settings = _checked(self.name, self.parameters, settings, overrides)
         self.sensors = self.sensors_of.get(variant, type(self).sensors)
+        self.step = self.steps_of.get(variant, type(self).step)
         self._types = _record_types(self)
         self._records: drivers.Records | None = None
 
@@ -211,7 +215,8 @@ def _record_types(method: CompiledMethod) -> _RecordTypes:
     params = [(name, np.float64) for name in (*method.vehicle_parameters, *own)]
     return _RecordTypes(
         state=method.state,
-        obs=record_type(("time", *method.sensors)),
+        # `time` last: numba takes a record for a subtype of one that it begins with
+        obs=record_type((*method.sensors, "time")),
         params=np.dtype(params or [("none", np.float64)]),
         est=record_type(method.outputs),
     )

@@ -9,7 +9,7 @@ the error of the wheel speed drives::
 Its poles have the natural frequency sqrt(eta R / I). The step is the implicit trapezoid, which is
 stable for every gain and sample time.
 
-Corrected here: the paper gives no gains. Its tables fit a natural frequency of 5 rad/s (variant
+Corrected here: the paper gives no gains. Its tables fit a natural frequency of 5.5 rad/s (variant
 `paper`), which lags by a fifth of a second; the default is 50 rad/s.
 """
 
@@ -137,7 +137,7 @@ class IndividualWheelTorque(CompiledMethod):
         Parameter("force_gain", 15000.0, "N/rad", "Gain eta of eq. 21", 0.0),
     )
     variants = {
-        "paper": PRINTED | {"wheel_gain": 21.0, "force_gain": 150.0},
+        "paper": PRINTED | {"wheel_gain": 23.0, "force_gain": 180.0},
         "magic_formula": MAGIC_FORMULA,
     }
     state = STATE
