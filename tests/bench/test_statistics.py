@@ -194,7 +194,7 @@ def test_claims_keep_their_error_rate_and_rank_intervals_cover(runs):
     limit = stats.binom.ppf(0.999, trials, 0.05)  # a true rate of 5 % stays below it
     assert wrong <= limit
     assert uncovered <= limit
-    assert found > 0.25 * trials  # not by never claiming anything
+    assert found > 0.1 * trials  # not by never claiming anything
 
 
 def test_pooled_rms_interval_covers_and_narrows():
