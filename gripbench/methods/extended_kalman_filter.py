@@ -194,7 +194,7 @@ class ExtendedKalmanFilter(CompiledMethod):
         Parameter("resistances", 1.0, "-", "1: drag and rolling resistance in a_x", 0.0, 1.0),
     )
     variants = {
-        "paper": PRINTED | {"force_density": 3e8, "resistances": 0.0},
+        "paper": PRINTED | {"force_density": 2e8, "resistances": 0.0},
         "magic_formula": MAGIC_FORMULA,
     }
     sensors_of = {
