@@ -1,0 +1,86 @@
+"""Commands for logs of real vehicles: import, inspect, and where their files are looked for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from gripbench.envs.logs.channel_map import load_channel_map
+from gripbench.envs.logs.importing import import_log
+from gripbench.envs.logs.inspection import inspect_log
+from gripbench.envs.logs.locations import VARIABLE, data_folder
+from gripbench.envs.logs.storing import store
+from gripbench.errors import InputError
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to the application."""
+    app.command("import")(import_)
+    data = typer.Typer(help="Files of published recordings.", no_args_is_help=True)
+    data.command("path")(path)
+    app.add_typer(data, name="data")
+
+
+def import_(
+    log: Annotated[Path, typer.Argument(help="The log, or the folder with a map's files.")],
+    channel_map: Annotated[
+        Path | None, typer.Option("--map", help="TOML file that says which column is what.")
+    ] = None,
+    inspect: Annotated[
+        bool, typer.Option("--inspect", help="List what is in the log and propose a map.")
+    ] = False,
+    database: Annotated[str, typer.Option(help="DBC file of a CAN trace, for --inspect.")] = "",
+    out: Annotated[
+        Path, typer.Option(help="Folder in which the recording gets a folder of its name.")
+    ] = Path("recordings"),
+) -> None:
+    """Import a log of a real vehicle as a recording, and report its quality."""
+    if inspect:
+        _print_inspection(log, database)
+        return
+    if channel_map is None:
+        raise InputError("import needs --map MAP.toml; --inspect proposes one")
+    name = load_channel_map(channel_map).name
+    imported = import_log(log, channel_map)
+    folder = store(imported, out / name)
+    print(imported.report.text())
+    for recording in imported.recordings:
+        seen = recording.observations
+        print(
+            f"{recording.scenario} run {recording.seed}: {len(seen)} rows over "
+            f"{seen['time'][-1]:.3f} s, "
+            f"{len([n for n in seen.dtype.names or () if not n.endswith('_new')]) - 1} channels"
+        )
+    print(f"stored in {folder}")
+
+
+def path(
+    folder: Annotated[
+        Path | None, typer.Option(help="A folder instead of the one that is set.")
+    ] = None,
+) -> None:
+    """Print where the files of published recordings are looked for."""
+    chosen = data_folder(folder)
+    print(chosen)
+    if not chosen.is_dir():
+        print(f"(no such folder; set {VARIABLE} to the one that has the files)")
+
+
+def _print_inspection(log: Path, database: str) -> None:
+    inspection = inspect_log(log, database)
+    table = Table("column", "unit", "samples", "blank", "lowest", "highest")
+    for column in inspection.columns:
+        table.add_row(
+            column.name,
+            column.unit,
+            str(column.samples),
+            str(column.blanks),
+            column.low,
+            column.high,
+        )
+    Console(stderr=True).print(table)
+    print(inspection.proposal, end="")
