@@ -136,7 +136,7 @@ def _dask(backend: Backend, work: Work, chunks: Iterable[Any]) -> Iterator[Any]:
 
 def _ray(backend: Backend, work: Work, chunks: Iterable[Any]) -> Iterator[Any]:
     try:
-        import ray
+        import ray  # type: ignore[import-not-found, import-untyped, unused-ignore]
     except ImportError:
         raise InputError("--backend ray needs: pip install 'gripbench[ray]'") from None
     where = {"address": backend.scheduler} if backend.scheduler else {"num_cpus": backend.processes}

@@ -133,6 +133,8 @@ class Cage:
                     "timeout", f"stopped after the time limit of {self.limits.time:g} s"
                 ) from None
             raise CellFailure("failed", reason) from None
+        except CellFailure:
+            raise
         except Exception as error:  # an answer that cannot be read
             self.close()
             raise CellFailure("failed", f"its answer cannot be read: {error}") from None

@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-import pandas as pd
 from pydantic import Field
 
 from gripbench.configuration import Configuration, parse
 from gripbench.errors import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SCHEMA_VERSION = 1
 """Version of the stored form; rows of every earlier version still load (see `_MIGRATIONS`)."""
@@ -181,6 +183,8 @@ def frame_of(rows: Iterable[Row]) -> pd.DataFrame:
     `sample_period, step_batch, step_p50, step_p99, step_max, deadline_misses, sensors, idealised,
     parameters, key`.
     """
+    import pandas as pd  # half a second that a worker process need not spend
+
     lines: list[dict[str, Any]] = []
     for row in rows:
         common = _common_columns(row)

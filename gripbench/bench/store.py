@@ -13,12 +13,14 @@ import json
 import os
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 from urllib.parse import quote
-
-import pandas as pd
 
 from gripbench.bench.rows import Row, frame_of, row_from
 from gripbench.errors import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 DEFAULT_RESULTS = Path("results")
 """Where commands keep results unless told otherwise, under the working directory."""

@@ -103,3 +103,13 @@ def failures(rows: pd.DataFrame) -> pd.DataFrame:
     bad = rows[rows["status"] != "ok"].drop_duplicates(["scenario", "label", "seed"])
     grouped = bad.groupby(["status", "scenario", "label", "reason"], sort=False)["seed"]
     return grouped.agg(runs="size", first_seed="min").reset_index()
+
+
+MEASURED = ("step_batch", "step_p50", "step_p99", "step_max", "deadline_misses")
+"""Columns that differ from one run of the same cell to the next."""
+
+
+def scores_csv(rows: pd.DataFrame) -> str:
+    """Return rows as CSV without what was measured: the same bytes for the same cells."""
+    text: str = rows.drop(columns=list(MEASURED)).to_csv(index=False, lineterminator="\n")
+    return text

@@ -1,0 +1,79 @@
+"""`gripbench list`, `gripbench show` and `gripbench methods table`: what there is."""
+
+from __future__ import annotations
+
+import json
+from enum import StrEnum
+from typing import Annotated
+
+import typer
+
+
+class Kind(StrEnum):
+    """What can be listed."""
+
+    SCENARIOS = "scenarios"
+    METHODS = "methods"
+    VEHICLES = "vehicles"
+    SIGNALS = "signals"
+    SUITES = "suites"
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands."""
+    app.command("list")(list_kind)
+    app.command("show")(show)
+    group = typer.Typer(no_args_is_help=True, help="Compare methods.")
+    group.command("table")(methods_table)
+    group.callback()(_methods)
+    app.add_typer(group, name="methods")
+
+
+def _methods() -> None:
+    """Compare methods."""
+
+
+def list_kind(kind: Annotated[Kind, typer.Argument(help="What to list.")]) -> None:
+    """List scenarios, methods, vehicles, signals or suites."""
+    from rich.table import Table
+
+    from gripbench.bench.catalogue import listing
+    from gripbench.bench.presentation import console
+
+    header, lines = listing(kind.value)
+    table = Table(*header)
+    for line in lines:
+        table.add_row(*line)
+    console().print(table)
+
+
+def show(
+    name: Annotated[str, typer.Argument(help="A scenario, method, vehicle, suite...")],
+) -> None:
+    """Show the full settings of whatever has this name, as JSON."""
+    from gripbench.bench.catalogue import settings
+    from gripbench.bench.presentation import console
+
+    console().print_json(json.dumps(settings(name)))
+
+
+def methods_table(
+    target: Annotated[str, typer.Option(help="Only methods that estimate this signal.")] = "",
+    everything: Annotated[
+        bool, typer.Option("--all", help="All methods, not only those of Li, Du & Li (2014).")
+    ] = False,
+) -> None:
+    """Print which sensors each method needs: Table I of Li, Du & Li (2014), from the code."""
+    from rich.table import Table
+
+    from gripbench.bench.catalogue import sensor_needs
+    from gripbench.bench.presentation import console
+    from gripbench.bench.summary import FOOTNOTE, MARK
+
+    header, lines = sensor_needs(target, everything)
+    table = Table(*header)
+    for line in lines:
+        table.add_row(*line)
+    console().print(table)
+    if any(MARK in text for line in lines for text in line):
+        console().print(FOOTNOTE)

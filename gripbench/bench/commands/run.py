@@ -1,0 +1,84 @@
+"""`gripbench run`: methods x scenarios x seeds, with a table of what came of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gripbench.bench.store import DEFAULT_RESULTS
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("run")(run)
+
+
+def run(
+    suite: Annotated[str, typer.Option(help="A suite's name or TOML file.")] = "",
+    scenario: Annotated[
+        list[str] | None, typer.Option(help="A scenario's name or TOML file; repeat for more.")
+    ] = None,
+    method: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="NAME[:VARIANT][@PARAMETER=NUMBER,...] or FILE.py:CLASS; repeat for more. "
+            "With a suite, they come on top of its methods."
+        ),
+    ] = None,
+    seeds: Annotated[str, typer.Option(help="N for seeds 0 to N-1, or A:B for A to B-1.")] = "",
+    workers: Annotated[int, typer.Option(min=0, help="Processes; 0: one a core.")] = 0,
+    backend: Annotated[str, typer.Option(help="loky, dask or ray.")] = "loky",
+    scheduler: Annotated[str, typer.Option(help="Address of a cluster's scheduler.")] = "",
+    fresh: Annotated[bool, typer.Option("--fresh", help="Run again what is stored.")] = False,
+    time_limit: Annotated[
+        float, typer.Option(help="Seconds that one cell of a method of yours may take.")
+    ] = 60.0,
+    memory_limit: Annotated[
+        float, typer.Option(help="MiB that a method of yours may take.")
+    ] = 2048.0,
+    results: Annotated[Path, typer.Option(help="Folder of the stored rows.")] = DEFAULT_RESULTS,
+    export: Annotated[
+        Path | None, typer.Option(help="Also write the scores, without runtimes, as CSV.")
+    ] = None,
+) -> None:
+    """Run methods on scenarios and print their RMS errors; what is stored is not run again."""
+    from gripbench.bench.api import limits_of, order_in, plan_of
+    from gripbench.bench.backends import Backend
+    from gripbench.bench.presentation import console, print_failures, print_summary, progress
+    from gripbench.bench.registry import load_suite
+    from gripbench.bench.rows import Row, frame_of
+    from gripbench.bench.runner import run_plan
+    from gripbench.bench.store import Store, write_atomically
+    from gripbench.bench.summary import scores_csv, summary
+
+    plan = plan_of(suite, scenario or [], method or [], seeds or None)
+    targets = load_suite(suite).targets if suite else ()
+    rows: list[Row] = []
+    with progress("running", plan.cells) as bar:
+        task = bar.task_ids[0]
+
+        def on_row(row: Row) -> None:
+            rows.append(row)
+            bar.advance(task)
+
+        report = run_plan(
+            plan,
+            Store(results),
+            Backend(backend, workers, scheduler),
+            limits_of(time_limit, memory_limit),
+            fresh,
+            on_row,
+        )
+    frame = frame_of(sorted(rows, key=order_in(plan)))
+    print_summary(summary(frame), targets)
+    print_failures(frame)
+    if export is not None:
+        export.parent.mkdir(parents=True, exist_ok=True)
+        write_atomically(export, scores_csv(frame))
+    counts = ", ".join(f"{count} {status}" for status, count in sorted(report.statuses.items()))
+    console().print(
+        f"{plan.cells} cells ({counts}); {report.computed} run, {report.stored} stored already; "
+        f"{report.seconds:.1f} s"
+    )
