@@ -31,6 +31,8 @@ class Driver(Configuration):
         The point that the driver looks at is so many seconds ahead.
     slip_use
         Largest front slip angle that the driver asks for, over mu F_z / C.
+    counter_steer
+        Front slip angle for a slide of the rear axle beyond what the turn needs [-].
     yaw_damping
         Steering angle for an excess of yaw rate [s].
     reaction
@@ -49,6 +51,7 @@ class Driver(Configuration):
 
     preview_time: float = Field(default=0.8, gt=0.05, le=5.0)
     slip_use: float = Field(default=2.5, gt=0.0, le=20.0)
+    counter_steer: float = Field(default=0.5, ge=0.0, le=10.0)
     yaw_damping: float = Field(default=0.1, ge=0.0, le=2.0)
     reaction: float = Field(default=0.08, gt=0.0, le=1.0)
     speed_gain: float = Field(default=0.6, ge=0.0, le=10.0)
@@ -138,6 +141,7 @@ DRIVER = np.dtype(
         for name in (
             "preview_time",
             "slip_use",
+            "counter_steer",
             "yaw_damping",
             "reaction",
             "speed_gain",
@@ -192,13 +196,16 @@ def steer_along(x, u, p, driver, path, memory):  # type: ignore[no-untyped-def]
     drift = math.atan2(x[plant.V_Y], v_x)
     aim = wrapped(math.atan2(target_y, target_x) - x[plant.YAW] - drift)
     curvature = 2.0 * math.sin(aim) / max(math.hypot(target_x, target_y), 1.0)
-    base = p.cg_to_front + p.cg_to_rear
-    load = p.mass * p.cg_to_rear / base
-    stiffness = 2.0 * p.tyre_y_front
     mu = 0.5 * (u[plant.MU] + u[plant.MU + 1])
-    largest = driver.slip_use * mu * load * u[plant.GRAVITY_Z] / stiffness
+    grip = mu * u[plant.GRAVITY_Z]
+    softness_front = p.mass_front / (2.0 * p.tyre_y_front)
+    softness_rear = p.mass_rear / (2.0 * p.tyre_y_rear)
     # Bank pushes sideways too: the tyres carry it besides the wanted acceleration.
-    slip = load * (curvature * speed * speed - u[plant.GRAVITY_Y]) / stiffness
+    wanted = curvature * speed * speed - u[plant.GRAVITY_Y]
+    wanted = min(max(wanted, -grip), grip)
+    slide = math.atan2(x[plant.V_Y] - p.cg_to_rear * x[plant.YAW_RATE], v_x)
+    slip = softness_front * wanted + driver.counter_steer * (slide + softness_rear * wanted)
+    largest = driver.slip_use * softness_front * grip
     slip = min(max(slip, -largest), largest)
     moving = math.atan2(x[plant.V_Y] + p.cg_to_front * x[plant.YAW_RATE], v_x)
     return moving + slip + driver.yaw_damping * (curvature * speed - x[plant.YAW_RATE])

@@ -24,42 +24,11 @@ from gripbench.envs.planar_truth import TRUTH
 from gripbench.envs.road import MagneticField, Road, disturb_field, lay_road, stream
 from gripbench.envs.scenarios import Scenario
 from gripbench.envs.simulation import Action, Simulation
-from gripbench.envs.tyres_combined import SHAPES
-from gripbench.envs.vehicles import Vehicle, require
-from gripbench.errors import InputError
+from gripbench.envs.vehicles import Vehicle
 
 WHEELS = ("front_left", "front_right", "rear_left", "rear_right")
 
 _LARGEST_TORQUE = 6000.0
-
-PLANAR_PARAMETERS = (
-    "mass",
-    "yaw_inertia",
-    "cg_to_front",
-    "cg_to_rear",
-    "cg_height",
-    "track_front",
-    "track_rear",
-    "wheel_radius",
-    "wheel_inertia",
-    "drag",
-    "rolling_resistance",
-    "longitudinal_stiffness",
-    "cornering_stiffness_front",
-    "cornering_stiffness_rear",
-    "stiffness_load_exponent",
-    "roll_gradient",
-    "roll_frequency",
-    "roll_damping",
-    "roll_share_front",
-    "pitch_gradient",
-    "load_lag",
-    "drive_share_front",
-    "brake_share_front",
-    "steer_limit",
-    "steer_rate_limit",
-)
-"""Vehicle parameters that the planar plant needs."""
 
 
 class SpeedWave(Configuration):
@@ -134,7 +103,7 @@ class PlanarSimulation(Simulation):
     scenario
         What to run.
     vehicle
-        Vehicle with every parameter of `PLANAR_PARAMETERS`.
+        Vehicle with every parameter of `gripbench.envs.planar_plant.PARAMETERS`.
 
     Raises
     ------
@@ -160,7 +129,7 @@ class PlanarSimulation(Simulation):
     def __init__(self, scenario: PlanarScenario, vehicle: Vehicle) -> None:
         self._scenario = scenario
         self.sample_time = scenario.sample_time
-        self._plant = plant_record(scenario.tyre, vehicle)
+        self._plant = plant.plant_record(scenario.tyre, vehicle)
         self._driver = _driver_record(scenario)
         self._parts = round(scenario.sample_time / plant.STEP)
         self._state = np.zeros(plant.STATES)
@@ -298,29 +267,6 @@ class PlanarSimulation(Simulation):
     def notes(self) -> dict[str, float]:
         """Return the time of the friction jump [s], if there was one."""
         return {} if math.isnan(self._jump_time) else {"mu_jump_time": self._jump_time}
-
-
-def plant_record(tyre: str, vehicle: Vehicle) -> npt.NDArray[Any]:
-    """Return what the compiled plant needs of a vehicle, one record of `PLANT`."""
-    given = require(vehicle.values(), PLANAR_PARAMETERS, "the planar plant")
-    record = np.zeros(1, plant.PLANT)
-    for name, value in given.items():
-        if name in plant.PLANT.names:  # type: ignore[operator]
-            record[name] = value
-    record["spin_inertia"] = 0.5 * given["wheel_inertia"]
-    record["tyre_x"] = 0.5 * given["longitudinal_stiffness"]
-    record["tyre_y_front"] = 0.5 * given["cornering_stiffness_front"]
-    record["tyre_y_rear"] = 0.5 * given["cornering_stiffness_rear"]
-    record["load_exponent"] = given["stiffness_load_exponent"]
-    record["shape"] = SHAPES[tyre]
-    smallest = 0.25 * given["mass"] * given["wheel_radius"] ** 2 * 1e-4
-    if record["spin_inertia"][0] < smallest:
-        raise InputError(
-            f"vehicle parameter 'wheel_inertia' is {given['wheel_inertia']:g} kg m^2: "
-            f"too small for a wheel of radius {given['wheel_radius']:g} m under this mass; "
-            f"allowed is {2.0 * smallest:g} and above"
-        )
-    return record
 
 
 def _driver_record(scenario: PlanarScenario) -> npt.NDArray[Any]:

@@ -95,7 +95,7 @@ def write_truth(time, x, u, p, heading, field, disturbance, wheels, dx, row, col
         The sample as a record of `TRUTH` and, in the same memory, as an array.
     """
     plant.derivative(x, u, p, wheels, dx)
-    force_x, force_y, _ = plant.resultant(x, p, wheels)
+    force_x, force_y, _ = plant.wheel_forces(x, u, p, wheels)
     bank = u[plant.BANK]
     grade = u[plant.GRADE]
     yaw = x[plant.YAW] + heading

@@ -200,7 +200,7 @@ def disturb_field(
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
 def feel_road(x, p, friction, profile, u):  # type: ignore[no-untyped-def]
-    """Write the road's share of the plant's inputs `u` for the state `x`."""
+    """Write the inputs `u` that the place on the road gives the state `x`: gravity, friction."""
     place = min(max(x[plant.DISTANCE] / SPACING, 0.0), profile.shape[0] - 2.000001)
     first = int(place)
     part = place - first
@@ -238,3 +238,4 @@ def feel_road(x, p, friction, profile, u):  # type: ignore[no-untyped-def]
             reached = (along - friction.mu_jump_at) / friction.mu_jump_length
             mu += min(max(reached, 0.0), 1.0) * (friction.mu_after - mu)
         u[plant.MU + i] = mu
+    plant.hold_stiffness(x, p, u)
