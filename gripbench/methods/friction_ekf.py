@@ -4,7 +4,7 @@ An extended Kalman filter over the friction coefficient alone. Slip angles follo
 angle (eq. 14), the brush tyre gives the lateral forces (eq. 15), and their sum is compared with
 the measured lateral acceleration (eq. 16).
 
-Errata corrected by default (`printed_equations = 1` restores those of eq. 15 and 16):
+Errata corrected by default (`printed_15` and `printed_16` restore them one by one):
 
 - (15): the condition is on the magnitude of the slip angle; as printed the force keeps growing
   for a large negative one, to -2 mu F_z at theta sigma = -2. Only the product c_p l^2 enters, so
@@ -14,7 +14,8 @@ Errata corrected by default (`printed_equations = 1` restores those of eq. 15 an
   roll are taken off the measured one first.
 
 Where the tyres are not excited the acceleration says nothing about the friction: an update is
-left out while |d a_y / d mu| is small.
+left out while |d a_y / d mu| is small, and while the acceleration itself is, since an error of
+the sideslip looks like sliding on a road of no friction then.
 """
 
 from __future__ import annotations
@@ -46,7 +47,10 @@ FRICTION_PARAMETERS = (
         "Noise density of the modelled lateral acceleration: 0.5 m/s^2 a sample at 166 Hz",
         1e-9, 100.0,
     ),
+    Parameter("printed_15", 0.0, "-", "1: slide for positive slip angles only", 0.0, 1.0),
+    Parameter("printed_16", 0.0, "-", "1: compare with the accelerometer's reading", 0.0, 1.0),
     Parameter("least_slope", 0.3, "m/s^2", "Least |d a_y / d mu| of an update", 0.0, 100.0),
+    Parameter("least_accel", 0.4, "m/s^2", "Least |a_y| of an update", 0.0, 100.0),
     Parameter("least_speed", 2.0, "m/s", "Least speed of an update", 0.1, 100.0),
 )  # fmt: skip
 
@@ -85,12 +89,11 @@ def brush_force(slip_angle, mu, load, stiffness, printed):  # type: ignore[no-un
 
 
 @compiled
-def lateral_acceleration(  # type: ignore[no-untyped-def]
-    mu, slip_front, slip_rear, steer, params, printed
-):
+def lateral_acceleration(mu, slip_front, slip_rear, steer, params):  # type: ignore[no-untyped-def]
     """Return the lateral acceleration of eq. 16 [m/s^2] and its derivative to the friction."""
     wheelbase = params.cg_to_front + params.cg_to_rear
     weight = params.mass * GRAVITY
+    printed = params.printed_15 > 0.0
     front, front_slope = brush_force(
         slip_front, mu, weight * params.cg_to_rear / wheelbase,
         params.cornering_stiffness_front, printed,
@@ -119,15 +122,13 @@ def friction_predict(friction, elapsed, params):  # type: ignore[no-untyped-def]
 
 @compiled
 def friction_update(  # type: ignore[no-untyped-def]
-    friction, accel_y, slip_front, slip_rear, steer, variance, params, printed
+    friction, accel_y, slip_front, slip_rear, steer, variance, params
 ):
     """Take a measured lateral acceleration [m/s^2] with its variance; return whether it was used.
 
     It is not where it says nothing about the friction, |d a_y / d mu| below `least_slope`.
     """
-    expected, slope = lateral_acceleration(
-        friction.mu, slip_front, slip_rear, steer, params, printed
-    )
+    expected, slope = lateral_acceleration(friction.mu, slip_front, slip_rear, steer, params)
     if not abs(slope) >= params.least_slope:
         return False
     spread = slope * slope * friction.variance + variance
@@ -141,7 +142,7 @@ def friction_update(  # type: ignore[no-untyped-def]
 
 @compiled
 def friction_step(  # type: ignore[no-untyped-def]
-    friction, time, speed_x, speed_y, yaw_rate, steer, accel_y, params, printed
+    friction, time, speed_x, speed_y, yaw_rate, steer, accel_y, params
 ):
     """Advance the friction filter by one sample.
 
@@ -161,8 +162,6 @@ def friction_step(  # type: ignore[no-untyped-def]
         Lateral acceleration that the tyre forces cause [m/s^2].
     params
         Record with `FRICTION_PARAMETERS` and `FRICTION_VEHICLE`.
-    printed
-        Nonzero: eq. 15 as printed.
     """
     if friction.variance == 0.0:
         friction.mu = params.first_mu
@@ -173,9 +172,8 @@ def friction_step(  # type: ignore[no-untyped-def]
         return
     friction.time = time
     friction_predict(friction, elapsed, params)
-    if speed_x > params.least_speed:
+    if speed_x > params.least_speed and abs(accel_y) >= params.least_accel:
         front, rear = slip_angles(speed_x, speed_y, yaw_rate, steer, params)
         friction_update(
-            friction, accel_y, front, rear, steer, params.accel_y_density**2 / elapsed,
-            params, printed,
-        )  # fmt: skip
+            friction, accel_y, front, rear, steer, params.accel_y_density**2 / elapsed, params
+        )

@@ -4,7 +4,7 @@ An extended Kalman filter over yaw and roll. The gyroscopes drive it (eq. 7), th
 seen by the magnetometer corrects it (eq. 6), and a measurement whose Mahalanobis distance is
 improbable is rejected (eq. 4): a passing lorry must not turn the heading.
 
-Errata corrected by default (`printed_equations = 1` restores them):
+Errata corrected by default (`printed_4`, `printed_6` and `printed_7` restore them one by one):
 
 - (4): the chi-square threshold applies to the squared distance of the innovation.
 - (5): the third column is (-sin theta, cos theta sin phi, cos theta cos phi).
@@ -97,14 +97,16 @@ HEADING_PARAMETERS = (
         "accelerometer_roll_std", 0.0, "rad sqrt(s)",
         "Noise density of the roll from the lateral accelerometer; 0: not used", 0.0, 100.0,
     ),
-    Parameter("printed_equations", 0.0, "-", "1: eq. 4, 6 and 7 as printed", 0.0, 1.0),
+    Parameter("printed_4", 0.0, "-", "1: the threshold is on the distance itself", 0.0, 1.0),
+    Parameter("printed_6", 0.0, "-", "1: m_z as eq. 6 prints it", 0.0, 1.0),
+    Parameter("printed_7", 0.0, "-", "1: rates of the angles as eq. 7 prints them", 0.0, 1.0),
 )  # fmt: skip
 
 PITCH_AWARE = {
     "pitch_from_gps": 1.0,
-    "magnetometer_std": 5e-7,
     "pitch_std": 5.0 * _DEGREE,
-    "accelerometer_roll_std": 0.78 * _DEGREE,
+    "roll_std": 1.0 * _DEGREE,
+    "accelerometer_roll_std": 4.0 * _DEGREE,
 }
 """Settings for roads with grades and banks."""
 
@@ -116,7 +118,7 @@ TABLE_1_NOISE = {
 }
 """The noise of Table 1 and neither of the two additions."""
 
-PRINTED_HEADING = TABLE_1_NOISE | {"printed_equations": 1.0}
+PRINTED_HEADING = TABLE_1_NOISE | {"printed_4": 1.0, "printed_6": 1.0, "printed_7": 1.0}
 """The same with the equations as printed."""
 
 UNGATED = 1e300
@@ -155,7 +157,7 @@ def heading_predict(heading, yaw_rate, roll_rate, elapsed, params):  # type: ign
     f = heading.filter
     decay = np.exp(-elapsed / params.roll_time)
     roll = f.x[1]
-    printed = params.printed_equations > 0.0
+    printed = params.printed_7 > 0.0
     yaw_speed = yaw_rate if printed else yaw_rate / np.cos(roll)
     roll_speed = roll_rate if printed else roll_rate + yaw_speed * np.sin(heading.pitch)
     f.x[0] += yaw_speed * elapsed
@@ -174,7 +176,7 @@ def heading_predict(heading, yaw_rate, roll_rate, elapsed, params):  # type: ign
 def heading_update_field(heading, x, y, z, params):  # type: ignore[no-untyped-def]
     """Take a magnetometer measurement [T]; return whether it passed the gate (eq. 4)."""
     f = heading.filter
-    printed = params.printed_equations > 0.0
+    printed = params.printed_6 > 0.0
     yaw, roll = f.x[0] - params.declination, f.x[1]
     pitch = heading.pitch
     horizontal, up = params.field_horizontal, params.field_up
@@ -198,7 +200,7 @@ def heading_update_field(heading, x, y, z, params):  # type: ignore[no-untyped-d
             f.R[i, j] = params.pitch_std**2 * by_pitch[i] * by_pitch[j]
         f.R[i, i] += params.magnetometer_std**2
     distance = innovation_distance(f)
-    if not (np.sqrt(distance) if printed else distance) <= params.gate:
+    if not (np.sqrt(distance) if params.printed_4 > 0.0 else distance) <= params.gate:
         heading.rejected += 1
         return False
     correct(f)

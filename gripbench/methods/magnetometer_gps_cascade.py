@@ -54,11 +54,10 @@ CASCADE_STATE = np.dtype(
 @compiled
 def _step(state, obs, params, est):  # type: ignore[no-untyped-def]
     heading, sideslip, friction = state.heading, state.sideslip, state.friction
-    printed = params.printed_equations > 0.0
     heading_step(heading, obs, params)
     yaw, roll = heading.filter.x[0], heading.filter.x[1]
     yaw_variance = heading.filter.P[0, 0]
-    yaw_rate = obs.yaw_rate if printed else obs.yaw_rate / np.cos(roll)
+    yaw_rate = obs.yaw_rate if params.printed_7 > 0.0 else obs.yaw_rate / np.cos(roll)
     accel_x = obs.accel_x + GRAVITY * np.sin(heading.pitch)
     accel_y = obs.accel_y - GRAVITY * np.sin(roll)
     sideslip_step(sideslip, obs.time, accel_x, accel_y, yaw_rate, yaw, roll, yaw_variance, params)
@@ -67,11 +66,10 @@ def _step(state, obs, params, est):  # type: ignore[no-untyped-def]
             sideslip, obs.gps_time, obs.velocity_north, obs.velocity_west, obs.velocity_up, params
         )
     now = sideslip.now
-    of_forces = obs.accel_y if printed else accel_y - now.x[3]
+    of_forces = obs.accel_y if params.printed_16 > 0.0 else accel_y - now.x[3]
     friction_step(
-        friction, obs.time, now.x[0], now.x[2], yaw_rate, obs.steer_angle, of_forces, params,
-        printed,
-    )  # fmt: skip
+        friction, obs.time, now.x[0], now.x[2], yaw_rate, obs.steer_angle, of_forces, params
+    )
     # An error of the heading turns the velocity as it is: the filter cannot average it away.
     sideslip_angle, sideslip_variance = sideslip_estimate(now)
     est.sideslip, est.sideslip_variance = sideslip_angle, sideslip_variance + yaw_variance
@@ -94,7 +92,7 @@ class MagnetometerGpsCascade(CompiledMethod):
     vehicle_parameters = FRICTION_VEHICLE
     parameters = (*HEADING_PARAMETERS, *SIDESLIP_PARAMETERS, *FRICTION_PARAMETERS)
     variants = {  # noqa: RUF012
-        "paper": PRINTED_HEADING,
+        "paper": PRINTED_HEADING | {"printed_15": 1.0, "printed_16": 1.0},
         "table_1_noise": TABLE_1_NOISE,
         "pitch_aware": PITCH_AWARE,
         "no_rejection": {"gate": UNGATED},

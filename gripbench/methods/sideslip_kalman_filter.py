@@ -54,6 +54,10 @@ SIDESLIP_PARAMETERS = (
     Parameter("bias_std", 0.2, "m/s^2", "First standard deviation of the biases", 0.0, 10.0),
     Parameter("gps_std", 0.07, "m/s", "Noise of the GPS velocity in vehicle axes", 1e-6, 100.0),
     Parameter(
+        "heading_share", 0.25, "-",
+        "Share of the heading's standard deviation that differs from sample to sample", 0.0, 1.0,
+    ),
+    Parameter(
         "delay_handling", REPLAY, "-", "0: delay ignored, 1: replay, 2: Larsen's shifting",
         IGNORE_DELAY, LARSEN,
     ),
@@ -277,7 +281,8 @@ def sideslip_step(  # type: ignore[no-untyped-def]
         )
         sideslip.late_time = row[_TIME]
     row[_TIME], row[_ACCEL_X], row[_ACCEL_Y], row[_YAW_RATE] = time, accel_x, accel_y, yaw_rate
-    row[_YAW], row[_ROLL], row[_YAW_VARIANCE] = yaw, roll, yaw_variance
+    row[_YAW], row[_ROLL] = yaw, roll
+    row[_YAW_VARIANCE] = params.heading_share**2 * yaw_variance
     sideslip.steps += 1
     if sideslip.started:
         sideslip_predict(sideslip.now, accel_x, accel_y, yaw_rate, time - before, params)

@@ -83,7 +83,7 @@ def test_slip_angles_agree_with_equation_14_when_small():
 
 
 def test_sliding_vehicle_has_all_its_friction():
-    accel, slope = lateral_acceleration(0.2, 0.5, 0.5, 0.0, parameters(), False)
+    accel, slope = lateral_acceleration(0.2, 0.5, 0.5, 0.0, parameters())
     assert accel == pytest.approx(0.2 * GRAVITY)
     assert slope == pytest.approx(GRAVITY)
 
@@ -100,17 +100,17 @@ def test_agrees_with_filterpy():
     twin.R = np.array([[variance]])
     for _ in range(300):
         slips = rng.normal(size=2) * 0.1
-        accel = lateral_acceleration(0.3, *slips, 0.02, params, False)[0] + 0.1 * rng.normal()
+        accel = lateral_acceleration(0.3, *slips, 0.02, params)[0] + 0.1 * rng.normal()
         friction_predict(ours[0], dt, params)
         twin.predict()
-        if friction_update(ours[0], accel, *slips, 0.02, variance, params, False):
+        if friction_update(ours[0], accel, *slips, 0.02, variance, params):
             used += 1
 
             def h(x, slips=slips):
-                return np.array([[lateral_acceleration(x[0, 0], *slips, 0.02, params, False)[0]]])
+                return np.array([[lateral_acceleration(x[0, 0], *slips, 0.02, params)[0]]])
 
             def jacobian(x, slips=slips):
-                return np.array([[lateral_acceleration(x[0, 0], *slips, 0.02, params, False)[1]]])
+                return np.array([[lateral_acceleration(x[0, 0], *slips, 0.02, params)[1]]])
 
             twin.update(np.array([[accel]]), jacobian, h)
         assert ours["mu"][0] == pytest.approx(twin.x[0, 0], rel=1e-9)
@@ -127,7 +127,7 @@ def weave(mu, amplitude=0.25, duration=8.0):
         speed_y = 13.0 * np.tan(amplitude * np.sin(1.5 * t))
         motion = (13.0, speed_y, 0.2 * np.cos(1.5 * t), 0.05 * np.sin(1.5 * t))
         slips = slip_angles(*motion, params)
-        accel = lateral_acceleration(mu(t), *slips, motion[3], params, False)[0]
+        accel = lateral_acceleration(mu(t), *slips, motion[3], params)[0]
         samples.append((t, *motion, accel))
     return params, samples
 
@@ -137,7 +137,7 @@ def test_finds_the_friction_and_a_jump_of_it():
     state = np.zeros(1, FRICTION_STATE)
     found = {}
     for sample in samples:
-        friction_step(state[0], *sample, params, False)
+        friction_step(state[0], *sample, params)
         found[round(sample[0], 2)] = state["mu"][0]
         assert state["variance"][0] >= 0.0
     assert found[3.99] == pytest.approx(0.25, rel=0.02)
@@ -149,7 +149,7 @@ def test_without_excitation_the_friction_stays():
     state = np.zeros(1, FRICTION_STATE)
     for t, *motion, _ in samples:
         motion[2:] = [0.0, 0.0]
-        friction_step(state[0], t, *motion, 0.3, params, False)
+        friction_step(state[0], t, *motion, 0.3, params)
     assert state["mu"][0] == 0.5
     assert state["taken"][0] == 0
 
@@ -158,5 +158,5 @@ def test_friction_stays_within_its_limits():
     params, samples = weave(lambda t: 0.25)
     state = np.zeros(1, FRICTION_STATE)
     for t, *motion, accel in samples:
-        friction_step(state[0], t, *motion, -10.0 * accel, params, False)
+        friction_step(state[0], t, *motion, -10.0 * accel, params)
         assert 0.03 <= state["mu"][0] <= 1.2

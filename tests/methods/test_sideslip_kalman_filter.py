@@ -22,7 +22,13 @@ from gripbench.methods.sideslip_kalman_filter import (
     velocity_in_vehicle,
 )
 
-NOISE = {"velocity_walk": 0.03, "bias_walk": 0.03, "bias_std": 0.2, "gps_std": 0.07}
+NOISE = {
+    "velocity_walk": 0.03,
+    "bias_walk": 0.03,
+    "bias_std": 0.2,
+    "gps_std": 0.07,
+    "heading_share": 1.0,
+}
 DT = 0.01
 
 
