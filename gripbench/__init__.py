@@ -10,21 +10,34 @@ Examples
 >>> gripbench.check_estimator(Friction)                     # doctest: +SKIP
 >>> rows = gripbench.run(suite="longitudinal", methods=[Friction], seeds=20)  # doctest: +SKIP
 >>> gripbench.summary(rows)                                 # doctest: +SKIP
+>>> gripbench.rank(rows, target="mu_front")                 # doctest: +SKIP
 """
 
 from __future__ import annotations
 
 import importlib
+import os
+import sys
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from gripbench.bench.api import run
     from gripbench.bench.check import check_estimator
+    from gripbench.bench.ranking import rank
     from gripbench.bench.registry import register
     from gripbench.bench.store import read_rows
     from gripbench.bench.summary import summary
     from gripbench.envs.worlds import load_scenario, record
     from gripbench.methods.contract import CompiledMethod, Estimator, Parameter, compiled
+
+# numba's cache must see edits of what a function calls, see gripbench.compilation
+_LOCATORS = (
+    "gripbench.compilation.BesideSource,gripbench.compilation.InUserFolder,"
+    "UserProvidedCacheLocator,InTreeCacheLocator,UserWideCacheLocator,IPythonCacheLocator"
+)
+os.environ.setdefault("NUMBA_CACHE_LOCATOR_CLASSES", _LOCATORS)
+if "numba" in sys.modules:
+    sys.modules["numba"].config.CACHE_LOCATOR_CLASSES = os.environ["NUMBA_CACHE_LOCATOR_CLASSES"]
 
 __version__ = "0.1.0"
 
@@ -35,6 +48,7 @@ DEFINED_IN = {
     "check_estimator": "gripbench.bench.check",
     "compiled": "gripbench.methods.contract",
     "load_scenario": "gripbench.envs.worlds",
+    "rank": "gripbench.bench.ranking",
     "read_rows": "gripbench.bench.store",
     "record": "gripbench.envs.worlds",
     "register": "gripbench.bench.registry",
@@ -50,6 +64,7 @@ __all__ = [
     "check_estimator",
     "compiled",
     "load_scenario",
+    "rank",
     "read_rows",
     "record",
     "register",

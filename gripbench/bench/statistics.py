@@ -106,12 +106,13 @@ def mean_log_rms(
     estimate = np.concatenate([np.log(np.maximum(pooled, floor[:scenarios])), constant]).mean(
         axis=0
     )
+    runs = runs if scenarios else 1
     draws = np.random.default_rng(seed).multinomial(runs, np.full(runs, 1.0 / runs), resamples)
     logs = np.zeros((resamples, methods))
     for squares, count, low in zip(sums_of_squares, counts, floor, strict=False):
         logs += np.log(np.maximum(np.sqrt((draws @ squares) / (draws @ count)), low))
     replicates = (logs + constant.sum(axis=0)) / (scenarios + len(fixed))
-    return Scores(estimate, replicates, runs if scenarios else 1)
+    return Scores(estimate, replicates, runs)
 
 
 def p_better(scores: Scores, margin: float = 0.0) -> Floats:
