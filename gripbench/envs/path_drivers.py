@@ -10,7 +10,7 @@ pure pursuit (it steers from the heading) does not do: it spins.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numba
 import numpy as np
@@ -109,7 +109,9 @@ Steering = Annotated[
 ]
 
 
-def steering_angles(steering: Steering, time: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+def steering_angles(
+    steering: Steering, time: npt.NDArray[np.floating[Any]]
+) -> npt.NDArray[np.float64]:
     """Return the steering angle [rad] of an open-loop manoeuvre at the given times [s]."""
     if isinstance(steering, StepSteer):
         rise = np.clip((time - steering.start) / steering.rise, 0.0, 1.0)
@@ -131,7 +133,7 @@ def steering_angles(steering: Steering, time: npt.NDArray[np.float64]) -> npt.ND
     return np.asarray(steering.amplitude * np.clip(since / steering.build_up, 0.0, 1.0) * wave)
 
 
-def _square(phase: npt.NDArray[np.float64], sharpness: float) -> npt.NDArray[np.float64]:
+def _square(phase: npt.NDArray[np.floating[Any]], sharpness: float) -> npt.NDArray[np.float64]:
     return np.asarray(np.tanh(sharpness * np.sin(phase)) / math.tanh(sharpness))
 
 

@@ -7,11 +7,11 @@ it starts at the origin along x. Turns to the left have positive curvature.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from gripbench.configuration import Configuration
 from gripbench.envs.road import SPACING, stream
@@ -45,6 +45,22 @@ class Segment(Configuration):
     angle: float = Field(default=0.0, ge=-100.0, le=100.0, description="[rad]")
     transition: float = Field(default=0.0, ge=0.0, description="length of each [m]")
 
+    @model_validator(mode="after")
+    def _check_geometry(self) -> Self:
+        turn = self.radius > 0.0 and self.angle != 0.0
+        if (self.length > 0.0) == turn or (not turn and (self.radius > 0.0 or self.angle != 0.0)):
+            raise ValueError("give either 'length' or both 'radius' and 'angle'")
+        if turn and self.radius < 2.0:
+            raise ValueError(
+                f"a radius of {self.radius:g} m is less than any car turns: 2 and above"
+            )
+        if turn and self.transition > abs(self.angle) * self.radius:
+            raise ValueError(
+                f"a transition of {self.transition:g} m does not fit into an arc of "
+                f"{abs(self.angle) * self.radius:g} m"
+            )
+        return self
+
 
 class Turns(Configuration):
     """Straights and turns, one after the other."""
@@ -66,6 +82,17 @@ class PublicRoad(Configuration):
     straight_low: float = Field(default=40.0, ge=0.0)
     straight_high: float = Field(default=90.0, ge=0.0)
     transition: float = Field(default=8.0, ge=0.0)
+
+    @model_validator(mode="after")
+    def _check_ranges(self) -> Self:
+        for name in ("angle", "radius", "straight"):
+            if getattr(self, f"{name}_high") < getattr(self, f"{name}_low"):
+                raise ValueError(f"{name}_high is below {name}_low")
+        if self.transition > self.angle_low * self.radius_low:
+            raise ValueError(
+                f"a transition of {self.transition:g} m does not fit into every corner"
+            )
+        return self
 
 
 Path = Annotated[DoubleLaneChange | Slalom | Turns | PublicRoad, Field(discriminator="kind")]

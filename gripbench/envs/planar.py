@@ -11,15 +11,9 @@ from pydantic import Field, field_validator, model_validator
 
 from gripbench.configuration import Configuration
 from gripbench.envs import planar_plant as plant
-from gripbench.envs.path_drivers import (
-    DRIVER,
-    MEMORY,
-    Driver,
-    Steering,
-    steering_angles,
-)
+from gripbench.envs.path_drivers import DRIVER, Driver, Steering, steering_angles
 from gripbench.envs.paths import Path, Turns, lay_path
-from gripbench.envs.planar_run import TERMINATIONS, act, begin, decide, roll_out
+from gripbench.envs.planar_run import TERMINATIONS, Run, act, allocate, begin, decide, roll_out
 from gripbench.envs.planar_truth import TRUTH
 from gripbench.envs.road import MagneticField, Road, disturb_field, lay_road, stream
 from gripbench.envs.scenarios import Scenario
@@ -132,16 +126,8 @@ class PlanarSimulation(Simulation):
         self._plant = plant.plant_record(scenario.tyre, vehicle)
         self._driver = _driver_record(scenario)
         self._parts = round(scenario.sample_time / plant.STEP)
-        self._state = np.zeros(plant.STATES)
-        self._inputs = np.zeros(plant.INPUTS)
-        self._memory = np.zeros(MEMORY)
-        self._action = np.zeros(len(self.actions))
-        self._wheels = np.zeros((4, plant.WHEEL_COLUMNS))
-        self._work = np.zeros((3, plant.STATES))
         self._sample = 0
         self._jump_time = math.nan
-        self._field = np.array([scenario.magnetic.horizontal, scenario.magnetic.vertical])
-        self._limits = np.array([scenario.stop_speed, scenario.off_road])
         time = np.arange(scenario.steps + 1) * scenario.sample_time
         wave = scenario.speed_wave
         self._planned = np.zeros((scenario.steps + 1, 2))
@@ -153,116 +139,65 @@ class PlanarSimulation(Simulation):
 
     def reset(self, seed: int) -> npt.NDArray[Any]:
         """Start a run; return its first sample, shape (1,)."""
-        scenario = self._scenario
-        self.termination = ""
-        self._sample = 0
-        self._jump_time = math.nan
-        self._heading = stream(seed, "heading").uniform(-math.pi, math.pi)
-        if scenario.path is None:
-            self._path = np.zeros((0, 4))
-        else:
-            self._path = lay_path(scenario.path, scenario.speed, seed)
-        longest = (scenario.speed + scenario.speed_wave.amplitude) * scenario.horizon + 200.0
-        ground = lay_road(scenario.road, self._path[:, 3], longest, seed)
-        self._friction, self._profile = ground.friction, ground.profile
-        self._disturbance = disturb_field(
-            scenario.magnetic, scenario.sample_time, scenario.steps + 1, seed
-        )
         first = np.zeros(1, TRUTH)
-        begin(
-            scenario.speed,
-            self._state,
-            self._inputs,
-            self._plant,
-            self._friction,
-            self._profile,
-            self._memory,
-            self._action,
-            self._heading,
-            self._field,
-            self._disturbance,
-            self._wheels,
-            self._work,
-            first,
-            first.view(np.float64).reshape(1, -1),
-        )
+        self._start(seed)
+        begin(self._run, self._scenario.speed, first, _as_matrix(first))
         return first
 
     def drive(self) -> npt.NDArray[np.float64]:
         """Return the driver's next action, shape (5,)."""
-        decide(
-            self._sample,
-            self._state,
-            self._inputs,
-            self._plant,
-            self._driver,
-            self._planned,
-            self._path,
-            self._memory,
-            self._action,
-        )
-        return self._action.copy()
+        decide(self._run, self._sample)
+        return self._run.action.copy()
 
     def advance(self, action: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
         """Hold an action for one sample time; return the sample at its end, shape (1,)."""
         after = np.zeros(1, TRUTH)
         self._sample += 1
-        code = act(
-            self._sample,
-            self._parts,
-            np.asarray(action, dtype=np.float64),
-            self._state,
-            self._inputs,
-            self._plant,
-            self._driver,
-            self._friction,
-            self._profile,
-            self._path,
-            self._memory,
-            self._limits,
-            self._heading,
-            self._field,
-            self._disturbance,
-            self._wheels,
-            self._work,
-            after,
-            after.view(np.float64).reshape(1, -1),
-            0,
-        )
+        given = np.array(action, dtype=np.float64)
+        code = act(self._run, self._sample, self._parts, given, after, _as_matrix(after), 0)
         self.termination = TERMINATIONS[code]
         return after
 
     def run(self, seed: int) -> npt.NDArray[Any]:
         """Run to the horizon or termination under the scenario's driver."""
         samples = np.zeros(self._scenario.steps + 1, TRUTH)
-        samples[0] = self.reset(seed)[0]
-        count, code = roll_out(
-            self._parts,
-            self._state,
-            self._inputs,
-            self._plant,
-            self._driver,
-            self._planned,
-            self._friction,
-            self._profile,
-            self._path,
-            self._memory,
-            self._action,
-            self._limits,
-            self._heading,
-            self._field,
-            self._disturbance,
-            self._wheels,
-            self._work,
-            samples,
-            samples.view(np.float64).reshape(len(samples), -1),
-        )
+        columns = _as_matrix(samples)
+        self._start(seed)
+        begin(self._run, self._scenario.speed, samples, columns)
+        count, code = roll_out(self._run, self._parts, samples, columns)
         self.termination = TERMINATIONS[code]
         truth = samples[:count]
         jumped = np.flatnonzero(truth["mu"] != truth["mu"][0])
         if self._scenario.road.mu_after > 0.0 and len(jumped):
             self._jump_time = float(truth["time"][jumped[0]])
         return truth
+
+    def _start(self, seed: int) -> None:
+        """Draw whatever is random in the run, and clear what changes."""
+        scenario = self._scenario
+        self.termination = ""
+        self._sample = 0
+        self._jump_time = math.nan
+        path = np.zeros((0, 4))
+        if scenario.path is not None:
+            path = lay_path(scenario.path, scenario.speed, seed)
+        fastest = scenario.speed + scenario.speed_wave.amplitude
+        ground = lay_road(scenario.road, path[:, 3], fastest * scenario.horizon + 200.0, seed)
+        field = scenario.magnetic
+        heading = stream(seed, "heading").uniform(-math.pi, math.pi)
+        self._run = Run(
+            plant=self._plant,
+            driver=self._driver,
+            friction=ground.friction,
+            planned=self._planned,
+            profile=ground.profile,
+            path=path,
+            disturbance=disturb_field(field, scenario.sample_time, scenario.steps + 1, seed),
+            site=np.array(
+                [heading, field.horizontal, field.vertical, scenario.stop_speed, scenario.off_road]
+            ),
+            **allocate(),
+        )
 
     def notes(self) -> dict[str, float]:
         """Return the time of the friction jump [s], if there was one."""
@@ -275,3 +210,7 @@ def _driver_record(scenario: PlanarScenario) -> npt.NDArray[Any]:
         record[name] = value
     record["sample_time"] = scenario.sample_time
     return record
+
+
+def _as_matrix(samples: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
+    return samples.view(np.float64).reshape(len(samples), -1)

@@ -74,7 +74,7 @@ _FIRST_WHEEL = len(_SCALARS)
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
-def write_truth(time, x, u, p, heading, field, disturbance, wheels, dx, row, columns):  # type: ignore[no-untyped-def]
+def write_truth(time, x, u, p, heading, north, up, disturbance, wheels, dx, row, columns):  # type: ignore[no-untyped-def]
     """Write one sample of the truth.
 
     Parameters
@@ -85,8 +85,8 @@ def write_truth(time, x, u, p, heading, field, disturbance, wheels, dx, row, col
         State, inputs and parameters of the plant.
     heading
         Direction of the track, from north to west [rad].
-    field
-        The Earth's field to the north and upwards [T], shape (2,).
+    north, up
+        The Earth's magnetic field [T].
     disturbance
         What disturbs it in the vehicle's axes [T], shape (3,).
     wheels, dx
@@ -131,7 +131,6 @@ def write_truth(time, x, u, p, heading, field, disturbance, wheels, dx, row, col
     row.yaw_rate = yaw_change * cos_pitch * cos_roll - pitch_change * sin_roll
 
     sin_yaw, cos_yaw = math.sin(yaw), math.cos(yaw)
-    north, up = field[0], field[1]
     level = cos_yaw * sin_pitch * north + cos_pitch * up
     row.magnetic_field_x = cos_yaw * cos_pitch * north - sin_pitch * up + disturbance[0]
     row.magnetic_field_y = -sin_yaw * cos_roll * north + sin_roll * level + disturbance[1]

@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field, model_validator
 from scipy.ndimage import gaussian_filter1d
+from scipy.signal import lfilter
 
 from gripbench.configuration import Configuration
 from gripbench.envs import planar_plant as plant
@@ -192,9 +193,7 @@ def disturb_field(
         steps = stream(seed, "magnetic.slow").standard_normal((samples, 3))
         steps *= field.slow_std * math.sqrt(1.0 - keep * keep)
         steps[0] *= 1.0 / math.sqrt(1.0 - keep * keep)
-        for k in range(1, samples):
-            steps[k] += keep * steps[k - 1]
-        added += steps
+        added += lfilter([1.0], [1.0, -keep], steps, axis=0)
     return added
 
 
