@@ -15,8 +15,8 @@ from gripbench.envs.longitudinal_paper_solver import STOP_EVERY, paper_solver, s
 from gripbench.envs.longitudinal_plant import (
     INPUT_TYPE,
     compiled,
-    derivatives,
     plant_record,
+    rates,
     tyre_force,
 )
 from gripbench.envs.profiles import Segment, breakpoints, profile_value, segment_records
@@ -109,19 +109,21 @@ TRUTH_TYPE = record_type(
 
 @compiled
 def _write_truth(time, x, inputs, plant, dx, truth):  # type: ignore[no-untyped-def]
-    derivatives(x, inputs, plant, dx)
+    force_front = tyre_force(x[1], x[0], inputs.mu_front, plant.load_front, plant)
+    force_rear = tyre_force(x[2], x[0], inputs.mu_rear, plant.load_rear, plant)
+    rates(x, force_front, force_rear, inputs, plant, dx)
     truth.time = time
     truth.speed_x = x[0]
     truth.wheel_speed_front = x[1]
     truth.wheel_speed_rear = x[2]
     truth.slip_ratio_front = slip_ratio(plant.wheel_radius * x[1], x[0])
     truth.slip_ratio_rear = slip_ratio(plant.wheel_radius * x[2], x[0])
-    truth.force_x_front = tyre_force(x[1], x[0], inputs.mu_front, plant.load_front, plant)
-    truth.force_x_rear = tyre_force(x[2], x[0], inputs.mu_rear, plant.load_rear, plant)
+    truth.force_x_front = force_front
+    truth.force_x_rear = force_rear
     truth.mu_front = inputs.mu_front
     truth.mu_rear = inputs.mu_rear
     limit = inputs.mu_front * plant.load_front + inputs.mu_rear * plant.load_rear
-    truth.utilisation = abs(truth.force_x_front + truth.force_x_rear) / limit
+    truth.utilisation = abs(force_front + force_rear) / limit
     truth.torque_front = inputs.torque_front
     truth.torque_rear = inputs.torque_rear
     truth.speed_x_rate = dx[0]

@@ -91,9 +91,24 @@ def tyre_force(wheel_speed, speed, mu, load, plant):  # type: ignore[no-untyped-
     return mu * load * magic_formula(slip, plant.magic_b, plant.magic_c, plant.magic_e)
 
 
+@_inline
+def rates(x, force_front, force_rear, inputs, plant, dx):  # type: ignore[no-untyped-def]
+    """Write the time derivative of the state for given tyre forces [N], eq. 2-3."""
+    radius, inertia = plant.wheel_radius, plant.wheel_inertia
+    gravity = GRAVITY * sin(inputs.road_grade) if inputs.road_grade != 0.0 else 0.0
+    dx[0] = (
+        (force_front + force_rear) / plant.mass
+        - plant.rolling_resistance * GRAVITY * _fade(x[0])
+        - plant.drag * x[0] * abs(x[0]) / plant.mass
+        + gravity
+    )
+    dx[1] = (_wheel_torque(inputs.torque_front, x[1], radius) - force_front * radius) / inertia
+    dx[2] = (_wheel_torque(inputs.torque_rear, x[2], radius) - force_rear * radius) / inertia
+
+
 @compiled
 def derivatives(x, inputs, plant, dx):  # type: ignore[no-untyped-def]
-    """Write the time derivative of the state, eq. 2-3.
+    """Write the time derivative of the state, eq. 2-5.
 
     Parameters
     ----------
@@ -108,25 +123,17 @@ def derivatives(x, inputs, plant, dx):  # type: ignore[no-untyped-def]
     """
     force_front = tyre_force(x[1], x[0], inputs.mu_front, plant.load_front, plant)
     force_rear = tyre_force(x[2], x[0], inputs.mu_rear, plant.load_rear, plant)
-    radius, inertia = plant.wheel_radius, plant.wheel_inertia
-    dx[0] = (
-        (force_front + force_rear) / plant.mass
-        - plant.rolling_resistance * GRAVITY * _fade(x[0])
-        - plant.drag * x[0] * abs(x[0]) / plant.mass
-        + GRAVITY * sin(inputs.road_grade)
-    )
-    dx[1] = (_wheel_torque(inputs.torque_front, x[1], radius) - force_front * radius) / inertia
-    dx[2] = (_wheel_torque(inputs.torque_rear, x[2], radius) - force_rear * radius) / inertia
+    rates(x, force_front, force_rear, inputs, plant, dx)
 
 
 @_inline
 def _force_slopes(wheel_speed, speed, mu, load, plant):  # type: ignore[no-untyped-def]
     rolling = plant.wheel_radius * wheel_speed
     slip = slip_ratio(rolling, speed)
-    _, slope = magic_formula_slope(slip, plant.magic_b, plant.magic_c, plant.magic_e)
+    share, slope = magic_formula_slope(slip, plant.magic_b, plant.magic_c, plant.magic_e)
     to_rolling, to_speed = slip_ratio_slopes(rolling, speed)
     slope *= mu * load
-    return slope * to_rolling * plant.wheel_radius, slope * to_speed
+    return mu * load * share, slope * to_rolling * plant.wheel_radius, slope * to_speed
 
 
 @_inline
@@ -135,10 +142,13 @@ def _torque_slope(torque, wheel_speed, radius):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def jacobian(x, inputs, plant, jac):  # type: ignore[no-untyped-def]
-    """Write the Jacobian of `derivatives`, shape (3, 3): an arrow, the axles do not couple."""
-    front_w, front_v = _force_slopes(x[1], x[0], inputs.mu_front, plant.load_front, plant)
-    rear_w, rear_v = _force_slopes(x[2], x[0], inputs.mu_rear, plant.load_rear, plant)
+def linearise(x, inputs, plant, dx, jac):  # type: ignore[no-untyped-def]
+    """Write the derivative and its Jacobian, shape (3, 3): an arrow, the axles do not couple."""
+    force_front, front_w, front_v = _force_slopes(
+        x[1], x[0], inputs.mu_front, plant.load_front, plant
+    )
+    force_rear, rear_w, rear_v = _force_slopes(x[2], x[0], inputs.mu_rear, plant.load_rear, plant)
+    rates(x, force_front, force_rear, inputs, plant, dx)
     radius, inertia = plant.wheel_radius, plant.wheel_inertia
     jac[0, 0] = (
         (front_v + rear_v) / plant.mass

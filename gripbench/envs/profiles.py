@@ -57,5 +57,6 @@ def profile_value(time, segments):  # type: ignore[no-untyped-def]
         if piece.start <= time < piece.end:
             share = (time - piece.start) / (piece.end - piece.start)
             value += piece.first + (piece.last - piece.first) * share
-            value += piece.amplitude * sin(2.0 * pi * (time - piece.start) / piece.period)
+            if piece.amplitude != 0.0:
+                value += piece.amplitude * sin(2.0 * pi * (time - piece.start) / piece.period)
     return value
