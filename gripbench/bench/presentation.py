@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterable
 
 import pandas as pd
 from rich.console import Console
@@ -64,13 +63,12 @@ def cell(line: pd.Series) -> str:
     return " ".join(parts)
 
 
-def rms_tables(summary: pd.DataFrame, targets: Iterable[str] = ()) -> list[Table]:
+def rms_tables(summary: pd.DataFrame) -> list[Table]:
     """Return one table a target: methods down, scenarios across."""
     tables = []
-    wanted = tuple(targets)
     for key, part in summary.groupby("target", sort=False):
         target = str(key)
-        if not target or (wanted and target not in wanted):
+        if not target:
             continue
         scenarios = list(dict.fromkeys(part["scenario"]))
         unit = signal(target).unit
@@ -90,10 +88,10 @@ def rms_tables(summary: pd.DataFrame, targets: Iterable[str] = ()) -> list[Table
     return tables
 
 
-def print_summary(summary: pd.DataFrame, targets: Iterable[str] = ()) -> None:
+def print_summary(summary: pd.DataFrame) -> None:
     """Print the tables of a summary, and what the mark means where it occurs."""
     out = console()
-    for table in rms_tables(summary, targets):
+    for table in rms_tables(summary):
         out.print(table)
     if (summary["idealised"] != "").any():
         out.print(FOOTNOTE)

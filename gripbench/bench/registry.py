@@ -24,12 +24,12 @@ from pydantic import Field
 
 from gripbench import methods as built_in
 from gripbench.bench.declarations import Declaration, Source, declaration_of, make
-from gripbench.bench.fingerprints import digest, source_digest
 from gripbench.configuration import CONFIGS, Configuration, parse, read_toml
 from gripbench.envs.scenarios import Scenario
 from gripbench.envs.worlds import load_scenario, scenario_files
 from gripbench.errors import InputError, unknown
 from gripbench.methods.contract import CompiledMethod
+from gripbench.sources import digest, source_digest
 
 METHOD_GROUP = "gripbench.methods"
 SCENARIO_GROUP = "gripbench.scenarios"

@@ -17,12 +17,13 @@ from typing import Any
 from gripbench.bench.backends import Backend, WorkerLostError
 from gripbench.bench.cage import Limits
 from gripbench.bench.cells import Task, close_cages, run_tasks
-from gripbench.bench.fingerprints import digest, scenario_digest, scoring_digest, versions
+from gripbench.bench.fingerprints import scenario_digest, scoring_digest, versions
 from gripbench.bench.registry import MethodSpec
 from gripbench.bench.rows import Row
 from gripbench.bench.store import DamagedRowError, Store
 from gripbench.envs.scenarios import Scenario
 from gripbench.errors import InputError
+from gripbench.sources import digest
 
 CHUNK = 4
 """Seeds in a chunk of work, where no method runs isolated."""

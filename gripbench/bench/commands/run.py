@@ -72,7 +72,8 @@ def run(
             on_row,
         )
     frame = frame_of(sorted(rows, key=order_in(plan)))
-    print_summary(summary(frame), targets)
+    shown = frame[frame["target"].isin([*targets, ""])] if targets else frame
+    print_summary(summary(shown))
     print_failures(frame)
     if export is not None:
         export.parent.mkdir(parents=True, exist_ok=True)
