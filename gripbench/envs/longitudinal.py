@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import sin
 from typing import Any, ClassVar, Literal, Self
 
@@ -22,7 +23,7 @@ from gripbench.envs.longitudinal_plant import (
 from gripbench.envs.profiles import Segment, breakpoints, profile_value, segment_records
 from gripbench.envs.scenarios import Scenario
 from gripbench.envs.signals import record_type
-from gripbench.envs.simulation import Action, Simulation
+from gripbench.envs.simulation import Action, Lanes, Simulation
 from gripbench.envs.tyres import slip_ratio
 from gripbench.envs.vehicles import GRAVITY, Vehicle
 from gripbench.errors import GripbenchError
@@ -30,6 +31,7 @@ from gripbench.errors import GripbenchError
 PAPER_SOLVER = "paper"
 
 _FULL_TORQUE = 5000.0
+_CHUNK = 1024  # process noise is drawn ahead in blocks; the stream is the same for any size
 
 
 class TorqueDriver(Configuration):
@@ -166,8 +168,9 @@ def _run(sample_time, x, step, inputs, plant, integrator, profiles, grade, jumps
 @compiled
 def _sampled_truth(times, states, inputs, plant, profiles, grade, work, truth):  # type: ignore[no-untyped-def]
     front, rear, friction = profiles
+    last = times[-1] - 1e-12  # profiles end at the horizon; its sample belongs to their inside
     for k in range(times.shape[0]):
-        set_inputs(inputs[0], times[k], front, rear, friction, grade)
+        set_inputs(inputs[0], min(times[k], last), front, rear, friction, grade)
         _write_truth(times[k], states[k], inputs[0], plant[0], work[10], truth[k])
 
 
@@ -190,6 +193,7 @@ class LongitudinalSimulation(Simulation):
 
     def __init__(self, scenario: LongitudinalScenario, vehicle: Vehicle) -> None:
         self.scenario = scenario
+        self._vehicle = vehicle
         paper = scenario.integrator == PAPER_SOLVER
         self.sample_time = None if paper else scenario.sample_time
         self._integrator = -1 if paper else integrators.INTEGRATORS[scenario.integrator]
@@ -231,7 +235,7 @@ class LongitudinalSimulation(Simulation):
         _command(self._k, sample_time, front, rear, friction, self.scenario.road_grade, inputs)
         inputs["torque_front"], inputs["torque_rear"] = action
         if len(self._pending) == 0:
-            self._pending = self._draw(1024)
+            self._pending = self._draw(_CHUNK)
         truth = np.zeros(1, TRUTH_TYPE)
         self._step = _advance(
             self._k,
@@ -282,6 +286,14 @@ class LongitudinalSimulation(Simulation):
         steps = sorted(piece.start for piece in self.scenario.friction)[1:]
         return {"friction_step": steps[0]} if steps else {}
 
+    def fresh(self) -> LongitudinalSimulation:
+        """Return another simulation of the same scenario and vehicle."""
+        return LongitudinalSimulation(self.scenario, self._vehicle)
+
+    def lanes(self, count: int) -> LongitudinalLanes:
+        """Return runs that advance in one compiled call."""
+        return LongitudinalLanes([self.fresh() for _ in range(count)])
+
     def _start(self) -> None:
         speed = self.scenario.initial_speed
         self._x = np.array([speed, *[speed / self._plant["wheel_radius"][0]] * 2])
@@ -329,6 +341,97 @@ class LongitudinalSimulation(Simulation):
             truth,
         )
         return truth
+
+
+class LongitudinalLanes(Lanes):
+    """Several runs of a longitudinal scenario, advanced in one compiled call."""
+
+    def __init__(self, simulations: Sequence[LongitudinalSimulation]) -> None:
+        super().__init__(simulations)
+        self._runs = simulations
+        count = len(simulations)
+        self._x = np.zeros((count, 3))
+        self._steps = np.zeros(count)
+        self._k = np.zeros(count, np.int64)
+        self._jumps = np.zeros((count, _CHUNK, 2))
+        self._ended = [""] * count
+
+    @property
+    def terminations(self) -> list[str]:
+        """Why each lane has ended; empty while it goes on."""
+        return self._ended
+
+    def reset(self, lane: int, seed: int) -> npt.NDArray[Any]:
+        """Start a lane; return its first sample."""
+        run = self._runs[lane]
+        truth = run.reset(seed)
+        self._x[lane], self._steps[lane], self._k[lane] = run._x, run._step, 0
+        self._ended[lane] = ""
+        return truth
+
+    def drive(self) -> npt.NDArray[np.float64]:
+        """Return the torques of the scenario's profiles in each lane."""
+        front, rear, _ = self._runs[0]._profiles
+        torques = np.empty((len(self._runs), 2))
+        _drive_lanes(self._k, self._runs[0].scenario.sample_time, front, rear, torques)
+        return torques
+
+    def advance(self, actions: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
+        """Hold the axle torques of each lane for one sample time."""
+        first = self._runs[0]
+        for lane in np.flatnonzero(self._k % _CHUNK == 0):
+            self._jumps[lane] = self._runs[lane]._draw(_CHUNK)
+        truth = np.zeros(len(self._runs), TRUTH_TYPE)
+        _advance_lanes(
+            self._k,
+            first.scenario.sample_time,
+            self._x,
+            self._steps,
+            actions,
+            first._inputs,
+            first._plant,
+            first._integrator,
+            first._profiles,
+            first.scenario.road_grade,
+            self._jumps,
+            first._work,
+            truth,
+        )
+        self._k += 1
+        for lane in np.flatnonzero(~np.isfinite(self._x).all(axis=1)):
+            self._ended[lane] = "diverged"
+        return truth
+
+
+@compiled
+def _drive_lanes(k, sample_time, front, rear, torques):  # type: ignore[no-untyped-def]
+    for lane in range(k.shape[0]):
+        middle = (k[lane] + 0.5) * sample_time
+        torques[lane, 0] = profile_value(middle, front)
+        torques[lane, 1] = profile_value(middle, rear)
+
+
+@compiled
+def _advance_lanes(
+    k, sample_time, x, steps, actions, inputs, plant, integrator, profiles, grade, jumps, work, truth
+):  # type: ignore[no-untyped-def]
+    front, rear, friction = profiles
+    for lane in range(x.shape[0]):
+        _command(k[lane], sample_time, front, rear, friction, grade, inputs[0])
+        inputs[0].torque_front = actions[lane, 0]
+        inputs[0].torque_rear = actions[lane, 1]
+        steps[lane] = _advance(
+            k[lane],
+            sample_time,
+            x[lane],
+            steps[lane],
+            inputs[0],
+            plant[0],
+            integrator,
+            jumps[lane, k[lane] % jumps.shape[1]],
+            work,
+            truth[lane],
+        )
 
 
 def _jump_stream(seed: int) -> np.random.Generator:
