@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gripbench.configuration import CONFIGS, parse, read_toml
+from gripbench.envs.bicycle import BicycleScenario, BicycleSimulation
 from gripbench.envs.longitudinal import LongitudinalScenario, LongitudinalSimulation
 from gripbench.envs.planar import PlanarScenario, PlanarSimulation
 from gripbench.envs.recordings import Recording
@@ -28,6 +29,7 @@ class World:
 WORLDS: dict[str, World] = {
     "longitudinal": World(LongitudinalScenario, LongitudinalSimulation),
     "planar": World(PlanarScenario, PlanarSimulation),
+    "bicycle": World(BicycleScenario, BicycleSimulation),
 }
 """Every world, by the name that scenario files use."""
 
