@@ -153,16 +153,14 @@ def boards(
     if not known:
         raise InputError("nothing to rank: no row has a target; run a method first")
     settings = _Settings(reference, confidence, resamples, seed)
+    given = None if sensors == ANY else chosen_instruments(sensors)
     found = []
     for name in [name for name in targets if name] or sorted(known):
-        of_target = rows[rows["target"] == name]
-        if sensors == ANY:
-            found.append(_board(rows, name, None, settings))
-            continue
-        given = chosen_instruments(sensors)
-        for allowed in [given] if given else sensor_sets(of_target):
-            if given or (of_target["status"] != "skipped").any():
-                found.append(_board(rows, name, allowed, settings))
+        ran = rows[(rows["target"] == name) & (rows["status"] != "skipped")]
+        for allowed in sensor_sets(ran) if given == () else [given]:
+            found.append(_board(rows, name, allowed, settings))
+    if not found:
+        raise InputError("nothing to rank: every run was skipped")
     return found
 
 

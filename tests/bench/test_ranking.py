@@ -182,6 +182,12 @@ def test_a_log_with_one_run_enters_beside_simulated_scenarios():
     assert board.lines.loc[1, "score"] == pytest.approx(2.0, rel=0.02)
 
 
+def test_method_that_nowhere_finds_its_sensors_gets_no_board_of_its_own():
+    rows = noisy_rows({"a": 2.0, "b": 1.0}, seeds=4)
+    rows += [row("gps", 0, None, status="skipped", sensors=GPS)]
+    assert [board.sensors for board in boards(frame_of(rows))] == [instruments(TORQUE)]
+
+
 def test_pareto_front_of_score_and_runtime():
     slow, fast = Runtime(batch=1e-3), Runtime(batch=1e-7)
     found = rank(noisy_frame({"a": 1.0, "b": 2.0, "c": 3.0}, a={"runtime": slow},
@@ -211,5 +217,10 @@ def test_bad_input_names_what_would_be_right():
             rank(frame, **arguments)
     with pytest.raises(InputError, match="nothing to rank"):
         rank(frame_of([]))
+    blind = [row("a", 0, None, status="skipped")]
+    with pytest.raises(InputError, match="nothing to rank: every run was skipped"):
+        rank(frame_of(blind))
+    with pytest.raises(InputError, match="mu_front: every run was skipped"):
+        rank(frame_of(blind), sensors="any")
     with pytest.raises(InputError, match="'a' has two rows for seed 0 of 'step'"):
         rank(frame_of([row("a", 0, 1.0), row("a", 0, 2.0)]))
