@@ -193,7 +193,6 @@ class LongitudinalSimulation(Simulation):
 
     def __init__(self, scenario: LongitudinalScenario, vehicle: Vehicle) -> None:
         self.scenario = scenario
-        self._vehicle = vehicle
         paper = scenario.integrator == PAPER_SOLVER
         self.sample_time = None if paper else scenario.sample_time
         self._integrator = -1 if paper else integrators.INTEGRATORS[scenario.integrator]
@@ -286,13 +285,10 @@ class LongitudinalSimulation(Simulation):
         steps = sorted(piece.start for piece in self.scenario.friction)[1:]
         return {"friction_step": steps[0]} if steps else {}
 
-    def fresh(self) -> LongitudinalSimulation:
-        """Return another simulation of the same scenario and vehicle."""
-        return LongitudinalSimulation(self.scenario, self._vehicle)
-
-    def lanes(self, count: int) -> LongitudinalLanes:
+    @classmethod
+    def together(cls, simulations: Sequence[LongitudinalSimulation]) -> LongitudinalLanes:
         """Return runs that advance in one compiled call."""
-        return LongitudinalLanes([self.fresh() for _ in range(count)])
+        return LongitudinalLanes(simulations)
 
     def _start(self) -> None:
         speed = self.scenario.initial_speed
@@ -413,7 +409,19 @@ def _drive_lanes(k, sample_time, front, rear, torques):  # type: ignore[no-untyp
 
 @compiled
 def _advance_lanes(
-    k, sample_time, x, steps, actions, inputs, plant, integrator, profiles, grade, jumps, work, truth
+    k,
+    sample_time,
+    x,
+    steps,
+    actions,
+    inputs,
+    plant,
+    integrator,
+    profiles,
+    grade,
+    jumps,
+    work,
+    truth,
 ):  # type: ignore[no-untyped-def]
     front, rear, friction = profiles
     for lane in range(x.shape[0]):

@@ -21,7 +21,7 @@ class Scenario(Configuration):
         Unique name; the file has the same.
     environment
         Versioned id of its Gymnasium environment, such as `gripbench/ConstantMu-v0`; the version
-        rises when results would change.
+        rises when results would change. Empty: none, because its integrator chooses the samples.
     description
         One sentence.
     world
@@ -43,7 +43,7 @@ class Scenario(Configuration):
     """
 
     name: str = Field(pattern=r"^[a-z][a-z0-9_]*$")
-    environment: str = Field(pattern=r"^gripbench/[A-Z][A-Za-z0-9]*-v[0-9]+$")
+    environment: str = Field(default="", pattern=r"^(gripbench/[A-Z][A-Za-z0-9]*-v[0-9]+)?$")
     description: str
     world: str
     vehicle: str

@@ -258,6 +258,79 @@ class SensorSuite:
                 self._walk[:, j] = walk.standard_normal(_CHUNK)
 
 
+class SensorLanes:
+    """The sensors of several runs, measured together in one compiled call.
+
+    Parameters
+    ----------
+    suites
+        Sensors of each lane, alike but for their seeds; they must not have measured yet.
+    """
+
+    def __init__(self, suites: list[SensorSuite]) -> None:
+        self.observation_type = suites[0].observation_type
+        self._suites = suites
+        self._samples = np.zeros(len(suites), np.int64)
+        self._stacks = {
+            name: np.stack([getattr(suite, name) for suite in suites]) for name in _LANE_ARRAYS
+        }
+        for lane, suite in enumerate(suites):
+            self._adopt(lane, suite)
+
+    def replace(self, lane: int, suite: SensorSuite) -> None:
+        """Start a lane afresh; `suite` must not have measured yet."""
+        for name in _LANE_ARRAYS:
+            self._stacks[name][lane] = getattr(suite, name)
+        self._samples[lane] = 0
+        self._suites[lane] = suite
+        self._adopt(lane, suite)
+
+    def observe(self, truth: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """Measure the next sample of each lane.
+
+        Parameters
+        ----------
+        truth
+            Structured array, shape (lanes,).
+
+        Returns
+        -------
+        Structured array, shape (lanes,), of `observation_type`.
+        """
+        for lane in np.flatnonzero(self._samples % _CHUNK == 0):
+            self._suites[lane]._draw()
+        observations = np.empty(len(truth), self.observation_type)
+        stacks = [self._stacks[name] for name in _LANE_ARRAYS]
+        _measure_lanes(self._samples, _as_matrix(truth), *stacks, _as_matrix(observations))
+        self._samples += 1
+        return observations
+
+    def _adopt(self, lane: int, suite: SensorSuite) -> None:
+        """Let a suite draw into the lane's part of the stacks."""
+        for name in _LANE_ARRAYS:
+            setattr(suite, name, self._stacks[name][lane])
+
+
+_LANE_ARRAYS = ("_specs", "_states", "_history", "_noise", "_walk")
+
+
+@numba.njit(cache=True, error_model="numpy", nogil=True)
+def _measure_lanes(samples, truth, specs, states, history, noise, walk, out):  # type: ignore[no-untyped-def]
+    for lane in range(truth.shape[0]):
+        k = samples[lane]
+        at = k % noise.shape[1]
+        _measure(
+            k,
+            truth[lane],
+            specs[lane],
+            states[lane],
+            history[lane],
+            noise[lane, at],
+            walk[lane, at],
+            out[lane],
+        )
+
+
 def _as_matrix(records: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
     """View records of float64 fields as a matrix, one row a record."""
     return records.view(np.float64).reshape(len(records), -1)

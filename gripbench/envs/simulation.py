@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -69,3 +70,41 @@ class Simulation(ABC):
     def notes(self) -> dict[str, float]:
         """Return facts of the run that a score may need, by name."""
         return {}
+
+    @classmethod
+    def together(cls, simulations: Sequence[Any]) -> Lanes:
+        """Return runs of one scenario that advance together."""
+        return Lanes(simulations)
+
+
+class Lanes:
+    """Several runs of one scenario, advanced one after the other.
+
+    A world whose plant can advance them in one compiled call derives from this.
+
+    Parameters
+    ----------
+    simulations
+        One simulation a lane.
+    """
+
+    def __init__(self, simulations: Sequence[Simulation]) -> None:
+        self._simulations = simulations
+
+    @property
+    def terminations(self) -> list[str]:
+        """Why each lane has ended; empty while it goes on."""
+        return [simulation.termination for simulation in self._simulations]
+
+    def reset(self, lane: int, seed: int) -> npt.NDArray[Any]:
+        """Start a lane; return its first sample, shape (1,)."""
+        return self._simulations[lane].reset(seed)
+
+    def drive(self) -> npt.NDArray[np.float64]:
+        """Return what the scenario's driver commands in each lane, shape (lanes, inputs)."""
+        return np.stack([simulation.drive() for simulation in self._simulations])
+
+    def advance(self, actions: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
+        """Hold the actions, shape (lanes, inputs), for one sample time; return shape (lanes,)."""
+        pairs = zip(self._simulations, actions, strict=True)
+        return np.concatenate([simulation.advance(action) for simulation, action in pairs])
