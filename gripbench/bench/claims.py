@@ -7,7 +7,7 @@ The same file names the seeds on which methods were tuned and those on which the
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
@@ -62,7 +62,8 @@ class Claim:
 class PublishedClaim(Configuration):
     """A claim as the paper's file gives it; attributes as those of `Claim`.
 
-    `comparable = false` needs a reason; otherwise at least one end of the tolerance is given.
+    `verdict` is what was found when the file was written, so that a change is noticed. A claim
+    that is not comparable needs a reason, the others at least one end of the tolerance.
     """
 
     item: str = Field(min_length=1)
@@ -71,18 +72,19 @@ class PublishedClaim(Configuration):
     published: float | None = None
     tolerance_low: float | None = None
     tolerance_high: float | None = None
-    comparable: bool = True
+    verdict: Verdict = "reproduced"
     reason: str = ""
 
     @model_validator(mode="after")
     def _check_range(self) -> Self:
         low, high = self.tolerance_low, self.tolerance_high
-        if self.comparable and low is None and high is None:
+        comparable = self.verdict != "not comparable"
+        if comparable and low is None and high is None:
             raise ValueError(f"claim '{self.item}' has neither tolerance_low nor tolerance_high")
         if low is not None and high is not None and low > high:
             raise ValueError(f"claim '{self.item}': tolerance_low is above tolerance_high")
-        if not self.comparable and not self.reason:
-            raise ValueError(f"claim '{self.item}' is not comparable but gives no reason")
+        if self.verdict != "reproduced" and not self.reason:
+            raise ValueError(f"claim '{self.item}' is {self.verdict} but gives no reason")
         return self
 
 
@@ -172,7 +174,7 @@ def judge(paper: Paper, figures: Mapping[str, float]) -> list[Claim]:
     claims = []
     for claim in paper.claims:
         ours = figures.get(claim.item)
-        if ours is None and claim.comparable:
+        if ours is None and claim.verdict != "not comparable":
             raise InputError(f"{paper.name}: no figure for the claim '{claim.item}'")
         claims.append(
             Claim(
@@ -192,8 +194,18 @@ def judge(paper: Paper, figures: Mapping[str, float]) -> list[Claim]:
 
 
 def _verdict(claim: PublishedClaim, ours: float | None) -> Verdict:
-    if not claim.comparable or ours is None:
+    if claim.verdict == "not comparable" or ours is None:
         return "not comparable"
     low = -float("inf") if claim.tolerance_low is None else claim.tolerance_low
     high = float("inf") if claim.tolerance_high is None else claim.tolerance_high
     return "reproduced" if isfinite(ours) and low <= ours <= high else "not reproduced"
+
+
+def changed_verdicts(paper: Paper, claims: Sequence[Claim]) -> list[str]:
+    """Return one line for each claim whose verdict is no longer the one in the paper's file."""
+    found = {claim.item: claim.verdict for claim in claims}
+    return [
+        f"{paper.name}, {claim.item}: was {claim.verdict}, is {found[claim.item]}"
+        for claim in paper.claims
+        if claim.item in found and found[claim.item] != claim.verdict
+    ]

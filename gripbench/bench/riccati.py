@@ -81,21 +81,38 @@ def steady_state(
     return SteadyState(*(float(value) for value in np.sqrt(np.diag(after))))
 
 
+def poles(
+    vehicle: Mapping[str, float], speed: float, *, printed: bool = False
+) -> npt.NDArray[np.complex128]:
+    """Return the poles [1/s] of sideslip and yaw rate.
+
+    Parameters
+    ----------
+    vehicle
+        Vehicle parameters of the single-track model.
+    speed
+        Speed [m/s].
+    printed
+        With A22 of eq. 5 as printed, without its sign.
+    """
+    matrix = _continuous(vehicle, speed)[:2, :2].copy()
+    if printed:
+        matrix[1, 1] = -matrix[1, 1]
+    return np.linalg.eigvals(matrix).astype(np.complex128)
+
+
+def _continuous(vehicle: Mapping[str, float], speed: float) -> npt.NDArray[np.float64]:
+    values = require(dict(vehicle), SINGLE_TRACK, "the single-track model")
+    model = np.zeros((5, 5))
+    single_track(model, *values.values(), speed)
+    return model
+
+
 def _model(
     vehicle: Mapping[str, float], speed: float, step: float, steer_noise: float, bias_walk: float
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
     """Return the transition matrix of a step and the covariance of its noise."""
-    values = require(dict(vehicle), SINGLE_TRACK, "steady_state")
-    params = np.array([tuple(values.values())], [(name, np.float64) for name in values])[0]
-    model = np.zeros((5, 5))
-    single_track(
-        model,
-        params,
-        values["cornering_stiffness_front"],
-        values["cornering_stiffness_rear"],
-        speed,
-    )
-    held = expm(model * step)
+    held = expm(_continuous(vehicle, speed) * step)
     transition = np.eye(4)
     transition[:3, :3] = held[:3, :3]
     column = np.append(held[:3, 3], 0.0)

@@ -51,8 +51,8 @@ DUGOFF_STATE = np.dtype(
 DUGOFF_PARAMETERS = (
     Parameter("friction", 0.8, "-", "Friction coefficient that the tyre model assumes", 0.01, 2.0),
     Parameter("speed_x_walk", 1e-2, "m^2/s^3", "Process noise of v_x", 0.0),
-    Parameter("speed_y_walk", 1e-2, "m^2/s^3", "Process noise of v_y", 0.0),
-    Parameter("yaw_rate_walk", 1e-3, "rad^2/s^3", "Process noise of the yaw rate", 0.0),
+    Parameter("speed_y_walk", 0.3, "m^2/s^3", "Process noise of v_y", 0.0),
+    Parameter("yaw_rate_walk", 1e-2, "rad^2/s^3", "Process noise of the yaw rate", 0.0),
     Parameter("speed_x_noise", 0.05, "m/s", "Noise of the speed sensor", 1e-9),
     Parameter("yaw_rate_noise", 1.745e-3, "rad/s", "Noise of the yaw rate sensor", 1e-9),
     Parameter("speed_y_std", 0.1, "m/s", "Standard deviation of v_y at the start", 0.0),

@@ -2,7 +2,9 @@
 
 Straight ahead the GPS course is the heading, which calibrates the yaw rate gyroscope; in a turn
 the gyroscope is integrated and the course less the integrated heading is the sideslip angle. A
-turn is a smoothed yaw rate above a threshold, and lasts for a hold time after it.
+turn is a smoothed yaw rate above a threshold, and lasts for a hold time after it; the threshold
+is wider by two standard deviations of the bias, or a large bias would pass for a turn and never
+be learnt.
 
 Errata: (4) prints the noise of a step as T^2 for both states, which suits white gyro noise given
 for a sample but makes the walk of the bias depend on the sample rate; spectral densities times
@@ -45,7 +47,7 @@ KINEMATIC_SENSORS = ("yaw_rate", "course", "course_new", "speed_gps", "gps_time"
 
 KINEMATIC_PARAMETERS = (
     Parameter("gyro_noise", 5.236e-4, "rad/s/sqrt(Hz)", "Density of the gyroscope's noise", 0.0),
-    Parameter("bias_walk", 8.727e-5, "rad/s/sqrt(s)", "Walk of the gyroscope's bias", 0.0),
+    Parameter("bias_walk", 1.745e-5, "rad/s/sqrt(s)", "Walk of the gyroscope's bias", 0.0),
     Parameter("gps_speed_noise", 0.05, "m/s", "Noise of the GPS velocity across the course", 1e-6),
     Parameter("bias_std", 1.745e-2, "rad/s", "Standard deviation of the bias at the start", 0.0),
     Parameter("gyro_scale", 1.0, "-", "Scale factor of the gyroscope, as far as known", 0.5, 2.0),
@@ -92,7 +94,7 @@ def advance_kinematic(state, obs, params):  # type: ignore[no-untyped-def]
 
     share = -np.expm1(-elapsed / params.turn_smoothing)
     state.smooth_rate += share * (obs.yaw_rate - state.smooth_rate)
-    if abs(state.smooth_rate - x[1]) > params.turn_rate:
+    if abs(state.smooth_rate - x[1]) > params.turn_rate + 2.0 * np.sqrt(filter.P[1, 1]):
         state.turn_until = obs.time + params.turn_hold
     remember(state.history, obs.time, state.integrated)
     state.rate = obs.yaw_rate

@@ -66,7 +66,7 @@ SINGLE_TRACK = (
 MODEL_BASED_PARAMETERS = (
     Parameter("gyro_noise", 5.236e-4, "rad/s/sqrt(Hz)", "Density of the gyroscope's noise", 1e-9),
     Parameter("steer_noise", 1.745e-4, "rad/sqrt(Hz)", "Density of the steering noise", 0.0),
-    Parameter("bias_walk", 8.727e-5, "rad/s/sqrt(s)", "Walk of the gyroscope's bias", 0.0),
+    Parameter("bias_walk", 1.745e-5, "rad/s/sqrt(s)", "Walk of the gyroscope's bias", 0.0),
     Parameter("gps_speed_noise", 0.05, "m/s", "Noise of the GPS velocity across the course", 1e-6),
     Parameter("bias_std", 1.745e-2, "rad/s", "Standard deviation of the bias at the start", 0.0),
     Parameter("sideslip_std", 1.745e-2, "rad", "Standard deviation of sideslip at the start", 0.0),
@@ -87,27 +87,28 @@ def start_model_based(state, params):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def single_track(model, params, front, rear, speed):  # type: ignore[no-untyped-def]
+def single_track(model, mass, inertia, a, b, front, rear, speed):  # type: ignore[no-untyped-def]
     """Fill the continuous model of sideslip, yaw rate, heading under steering and bank.
 
     Parameters
     ----------
     model
         Matrix (5, 5) of zeros, filled: eq. 5 with the signs corrected, its input and the bank.
-    params
-        Record with the mass, the inertia and the axle distances.
+    mass, inertia
+        Mass [kg] and moment of inertia about z [kg m^2].
+    a, b
+        Distance of front and rear axle from the centre of gravity [m].
     front, rear
         Cornering stiffness of the axles [N/rad].
     speed
         Speed [m/s].
     """
-    m, inertia, a, b = params.mass, params.yaw_inertia, params.cg_to_front, params.cg_to_rear
-    model[0, 0] = -(front + rear) / (m * speed)
-    model[0, 1] = (b * rear - a * front) / (m * speed * speed) - 1.0
+    model[0, 0] = -(front + rear) / (mass * speed)
+    model[0, 1] = (b * rear - a * front) / (mass * speed * speed) - 1.0
     model[1, 0] = (b * rear - a * front) / inertia
     model[1, 1] = -(a * a * front + b * b * rear) / (inertia * speed)
     model[2, 1] = 1.0
-    model[0, 3] = front / (m * speed)
+    model[0, 3] = front / (mass * speed)
     model[1, 3] = a * front / inertia
     model[0, 4] = -GRAVITY / speed  # left side up (positive bank): gravity pulls to the right
 
@@ -135,7 +136,16 @@ def advance_model_based(state, obs, params, bank, front, rear):  # type: ignore[
     ):
         key[0], key[1], key[2], key[3] = elapsed, speed, front, rear
         state.model[:] = 0.0
-        single_track(state.model, params, front, rear, speed)
+        single_track(
+            state.model,
+            params.mass,
+            params.yaw_inertia,
+            params.cg_to_front,
+            params.cg_to_rear,
+            front,
+            rear,
+            speed,
+        )
         for i in range(5):
             for j in range(5):
                 state.model[i, j] *= elapsed
