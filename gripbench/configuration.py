@@ -67,7 +67,10 @@ def parse(model: type[Model], content: Mapping[str, Any], source: str | Path) ->
     try:
         return model.model_validate(dict(content))
     except ValidationError as error:
-        raise InputError(f"{source}: {_describe(model, error.errors()[0])}") from None
+        details = error.errors()
+        # a misspelt key is also a missing one; the misspelling is what helps
+        misspelt = [detail for detail in details if detail["type"] == "extra_forbidden"]
+        raise InputError(f"{source}: {_describe(model, [*misspelt, *details][0])}") from None
 
 
 def _describe(model: type[BaseModel], detail: ErrorDetails) -> str:
