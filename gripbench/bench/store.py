@@ -165,9 +165,7 @@ def write_atomically(path: Path, text: str) -> None:
     except OSError as error:
         with contextlib.suppress(OSError):
             temporary.unlink()
-        raise InputError(
-            f"{path}: cannot be written: {_remedy(error)}; rows finished so far are kept"
-        ) from None
+        raise InputError(f"{path}: cannot be written: {_remedy(error)}") from None
 
 
 def leftovers(results: Path | str) -> list[Path]:
@@ -182,7 +180,9 @@ def _write(path: Path, text: str) -> None:
 
 def _remedy(error: OSError) -> str:
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
-        return "the disk is full; make room and run the same command again"
+        return (
+            "the disk is full; make room and run the same command again, what is finished is kept"
+        )
     if error.errno in (errno.EROFS, errno.EACCES, errno.EPERM):
         return "the results folder is read-only; choose another with --results"
     return str(error.strerror or error).lower()
