@@ -35,4 +35,4 @@ def nearest(name: str, known: Iterable[str]) -> str:
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> InputError:
     """Return the error for a name that nobody knows, with the nearest known one."""
-    return InputError(f"unknown {kind} '{name}': {nearest(name, known)}")
+    return InputError(f"unknown {kind} {name!r}: {nearest(name, known)}")

@@ -80,7 +80,9 @@ def _database(cantools: Any, path: Path, name: str) -> Any:
 
 def _frames(can: Any, path: Path) -> Any:
     if path.suffix.lower() == ".blf":
-        with can.BLFReader(path) as reader:
+        # Opened here, for the reader leaves a file that it refuses open.
+        with path.open("rb") as handle:
+            reader = can.BLFReader(handle)
             if reader.file_size and reader.file_size != path.stat().st_size:
                 raise InputError(
                     f"{path}: has {path.stat().st_size} of {reader.file_size} bytes: "

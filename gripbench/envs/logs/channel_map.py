@@ -27,7 +27,7 @@ The SI value of a channel is `sign * scale * (column - offset) * unit / per`.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
@@ -39,6 +39,10 @@ from gripbench.errors import GripbenchError, InputError, unknown
 
 DATETIME = "datetime"
 """Unit of a time column that holds ISO 8601 dates."""
+
+
+Name = Annotated[str, Field(pattern=r"^[^\x00-\x1f]*$")]
+"""Name of a column or file: on one line, for it appears in messages."""
 
 
 class TimeColumn(Configuration):
@@ -57,7 +61,7 @@ class TimeColumn(Configuration):
         Seconds to add, to bring the files of one recording to one clock.
     """
 
-    column: str = "time"
+    column: Name = "time"
     unit: str = "s"
     backwards: Literal["refuse", "drop"] = "refuse"
     shift: float = 0.0
@@ -87,10 +91,10 @@ class LogFile(Configuration):
         How a CSV file separates columns and writes numbers; an empty delimiter is found by itself.
     """
 
-    path: str
+    path: Name
     sha256: str = Field(default="", pattern=r"^([0-9a-f]{64})?$")
     time: TimeColumn = TimeColumn()
-    database: str = ""
+    database: Name = ""
     delimiter: Literal["", ",", ";", "\t", "|"] = ""
     decimal: Literal[".", ","] = "."
 
@@ -128,17 +132,17 @@ class Column(Configuration):
         Take the mean over the first standstill, or the first straight stretch, for the zero.
     """
 
-    column: str = Field(min_length=1)
-    file: str = ""
+    column: Name = Field(min_length=1)
+    file: Name = ""
     unit: str
     sign: Literal[1, -1] = 1
     scale: float = Field(default=1.0, gt=0.0)
     offset: float = 0.0
     per: str = ""
     rate: float = Field(default=0.0, ge=0.0)
-    new_when: str = ""
-    new_where: str = ""
-    time: str = ""
+    new_when: Name = ""
+    new_where: Name = ""
+    time: Name = ""
     delay: float = Field(default=0.0, ge=0.0, le=10.0)
     zero: Literal["", "standstill", "straight"] = ""
 
@@ -240,15 +244,15 @@ class ChannelMap(Configuration):
     licence: str = ""
     source: str = ""
     version: str = ""
-    vehicle: str = ""
+    vehicle: Name = ""
     time: TimeColumn = TimeColumn()
     sha256: str = Field(default="", pattern=r"^([0-9a-f]{64})?$")
-    database: str = ""
+    database: Name = ""
     delimiter: Literal["", ",", ";", "\t", "|"] = ""
     decimal: Literal[".", ","] = "."
     files: dict[str, LogFile] = Field(default_factory=dict)
     rows: str = ""
-    runs: str = ""
+    runs: Name = ""
     training_runs: tuple[int, ...] = ()
     channels: dict[str, Column] = Field(min_length=1)
     reference: dict[str, Column] = Field(default_factory=dict)

@@ -239,7 +239,7 @@ def _rows(
     if channel_map.rows:
         rows = channels[channel_map.rows].times
     else:
-        rows = np.unique(np.concatenate(_distinct([s.times for s in channels.values()])))
+        rows = _merged([s.times for s in channels.values()])
     first = max(s.times[0] for s in channels.values())
     latest = min(channels.values(), key=lambda s: s.times[-1])
     if first > latest.times[-1]:
@@ -254,17 +254,20 @@ def _rows(
     dropped = {}
     for name, series in channels.items():
         inside = series.times[(series.times >= first) & (series.times <= rows[-1])]
-        used = len(np.unique(np.searchsorted(rows, inside)))
-        dropped[name] = len(inside) - used
+        dropped[name] = int((np.diff(np.searchsorted(rows, inside)) == 0).sum())
     return rows, dropped
 
 
-def _distinct(arrays: list[Floats]) -> list[Floats]:
+def _merged(arrays: list[Floats]) -> Floats:
+    """Return all times of the arrays, each once, in order."""
     kept: list[Floats] = []
     for array in arrays:
-        if not any(array is other or np.array_equal(array, other) for other in kept):
+        if not any(np.array_equal(array, other) for other in kept):
             kept.append(array)
-    return kept
+    if len(kept) == 1:
+        return kept[0]
+    times = np.sort(np.concatenate(kept))
+    return times[np.append(True, np.diff(times) > 0.0)]
 
 
 def _held(channels: dict[str, Series], rows: Floats, origin: float) -> npt.NDArray[Any]:

@@ -149,9 +149,9 @@ def _seconds_of_dates(path: Path, where: str, column: LogColumn) -> Floats:
         raise InputError(f"{path}: key '{where}': the dates mix time zones ({shown}); use one")
     try:
         moments = pd.to_datetime(pd.Series(texts), format="ISO8601", utc=True)
-    except (ValueError, OverflowError) as error:
+    except (ValueError, OverflowError):
         raise InputError(
-            f"{path}: key '{where}': not all dates are ISO 8601 ({str(error)[:120]})"
+            f"{path}: key '{where}': not all dates are ISO 8601, such as {texts[0][:40]!r}"
         ) from None
     seconds = np.full(len(column.values), np.nan)
     nanoseconds = moments.astype("datetime64[ns, UTC]").astype("int64").to_numpy()

@@ -84,7 +84,8 @@ def load(folder: Path) -> ImportedLog:
     except GripbenchError:
         raise
     except FileNotFoundError as error:
-        raise InputError(f"{error.filename}: no such file") from None
+        missing = error.filename or str(error)
+        raise InputError(f"{folder}: damaged recording, a file is missing ({missing})") from None
     except (OSError, ValueError, KeyError, TypeError, pa.ArrowException) as error:
         raise InputError(f"{folder}: damaged recording ({str(error)[:200]})") from None
 

@@ -77,6 +77,8 @@ UNITS: dict[str, Unit] = {
     "N": _unit(1.0, kg=1, m=1, s=-2),
     "kN": _unit(1e3, kg=1, m=1, s=-2),
     "lbf": _unit(4.4482216152605, kg=1, m=1, s=-2),
+    "N/rad": _unit(1.0, kg=1, m=1, s=-2, rad=-1),
+    "N/deg": _unit(1.0 / _DEGREE, kg=1, m=1, s=-2, rad=-1),
     "N m": _unit(1.0, kg=1, m=2, s=-2),
     "kN m": _unit(1e3, kg=1, m=2, s=-2),
     "lbf ft": _unit(1.3558179483314, kg=1, m=2, s=-2),
