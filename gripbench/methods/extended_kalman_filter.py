@@ -186,15 +186,21 @@ class ExtendedKalmanFilter(CompiledMethod):
     )
     parameters = (
         *AXLE_FRICTION_PARAMETERS,
-        Parameter("wheel_speed_density", 0.01, "rad^2/s^3", "Process noise of wheel speeds", 0.0),
+        Parameter("wheel_speed_density", 20.0, "rad^2/s^3", "Process noise of wheel speeds", 0.0),
         Parameter("force_density", 1e6, "N^2/s", "Process noise of the tyre forces", 0.0),
-        Parameter("acceleration_variance", 0.09, "m^2/s^4", "Variance of a_x", 1e-12),
+        Parameter("acceleration_variance", 1e-3, "m^2/s^4", "Variance of a_x", 1e-12),
         Parameter("wheel_speed_variance", 1e-5, "rad^2/s^2", "Variance of wheel speeds", 1e-12),
         Parameter("force_variance", 1e6, "N^2", "Initial variance of the tyre forces", 0.0),
         Parameter("resistances", 1.0, "-", "1: drag and rolling resistance in a_x", 0.0, 1.0),
     )
     variants = {
-        "paper": PRINTED | {"force_density": 2e8, "resistances": 0.0},
+        "paper": PRINTED
+        | {
+            "wheel_speed_density": 0.01,
+            "force_density": 2e8,
+            "acceleration_variance": 0.09,
+            "resistances": 0.0,
+        },
         "magic_formula": MAGIC_FORMULA,
     }
     sensors_of = {

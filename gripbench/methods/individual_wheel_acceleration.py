@@ -112,7 +112,7 @@ class IndividualWheelAcceleration(CompiledMethod):
     )
     parameters = (
         *AXLE_FRICTION_PARAMETERS,
-        Parameter("difference_time", 0.05, "s", "Low-pass of the differenced wheel speeds", 0.0),
+        Parameter("difference_time", 0.1, "s", "Low-pass of the differenced wheel speeds", 0.0),
     )
     variants = {
         "paper": PRINTED | {"difference_time": 0.0},
