@@ -1,0 +1,48 @@
+"""`gripbench plot`: truth and estimates of a signal over one run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gripbench.bench.store import DEFAULT_RESULTS
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("plot")(plot)
+
+
+def plot(
+    scenario: Annotated[str, typer.Argument(help="A scenario's name or TOML file.")],
+    methods: Annotated[
+        str,
+        typer.Option(
+            help="NAME[:VARIANT] or FILE.py:CLASS, several with commas between. "
+            "None: the truth alone."
+        ),
+    ] = "",
+    signal: Annotated[str, typer.Option(help="What to draw, such as mu_front or sideslip.")] = "mu",
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the run.")] = 0,
+    start: Annotated[float | None, typer.Option(help="From this time [s].")] = None,
+    end: Annotated[float | None, typer.Option(help="Up to this time [s].")] = None,
+    output: Annotated[
+        Path | None, typer.Option(help="File name without suffix; by default under RESULTS/plots.")
+    ] = None,
+    results: Annotated[Path, typer.Option(help="Folder of results.")] = DEFAULT_RESULTS,
+    dpi: Annotated[int, typer.Option(min=30, max=1200, help="Dots an inch of the PNG.")] = 150,
+) -> None:
+    """Draw a signal of one run, truth against estimates and their errors, as PNG and PDF."""
+    from gripbench.bench.figures.run_plot import run_plot
+    from gripbench.bench.figures.runs import Runs
+    from gripbench.bench.figures.style import save, style
+
+    chosen = [name.strip() for name in methods.split(",") if name.strip()]
+    if output is None:
+        output = results / "plots" / f"{Path(scenario).stem}_{signal}_{seed}"
+    with style():
+        figure = run_plot(Runs(), scenario, chosen, signal, seed, start, end)
+        paths = save(figure, output.parent, output.name.removesuffix(".png"), dpi)
+    typer.echo("Written: " + ", ".join(str(path) for path in paths))

@@ -1,0 +1,1 @@
+"""Pictures: the result figures of the papers by number, and plots of any run."""
