@@ -120,7 +120,7 @@ def changes_table(changes: list[Change]) -> Table:
     )
     rows = tuple({**vars(change), "confidence": _percent(change.confidence)} for change in changes)
     failing = sum(change.regression for change in changes)
-    caption = f"{failing} regressions, {len(changes) - failing} other changes"
+    caption = f"Regressions: {failing}; other changes: {len(changes) - failing}."
     return Table(columns, rows, caption=caption if changes else "No change.")
 
 

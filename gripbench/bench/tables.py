@@ -418,7 +418,7 @@ def _csv(value: Any) -> str:
 
 
 def _markdown(text: str) -> str:
-    text = re.sub(r"([\\`*_|<>])", r"\\\1", text)
+    text = re.sub(r"([\\`*|<]|(?<!\w)_|_(?!\w))", r"\\\1", text)  # mu_front reads as it is
     return text.replace("\n", " ")
 
 

@@ -1,0 +1,76 @@
+"""`gripbench leaderboard`: build it, and compare it with an earlier one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gripbench.bench.store import DEFAULT_RESULTS
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("leaderboard")(leaderboard)
+
+
+def leaderboard(
+    results: Annotated[Path, typer.Option(help="Folder of the stored rows.")] = DEFAULT_RESULTS,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder for leaderboard.md, .csv and .json; by default --results."),
+    ] = None,
+    suite: Annotated[
+        str, typer.Option(help="Only the scenarios of this suite; by default all rows.")
+    ] = "",
+    timings: Annotated[
+        Path | None,
+        typer.Option(help="JSON of pytest-benchmark for runtimes relative to the reference."),
+    ] = None,
+    compare: Annotated[
+        Path | None,
+        typer.Option(help="An earlier leaderboard.json, or its folder; exit 1 on a regression."),
+    ] = None,
+    factor: Annotated[
+        float, typer.Option(help="Factor by which a relative runtime may rise.")
+    ] = 1.5,
+    margin: Annotated[float, typer.Option(help="Share by which an RMS may rise.")] = 0.001,
+    confidence: Annotated[float, typer.Option(help="Confidence of every claim.")] = 0.95,
+    report: Annotated[
+        Path | None,
+        typer.Option(help="Also write the comparison, as .md, .csv, .html, .tex or .txt."),
+    ] = None,
+) -> None:
+    """Build the leaderboard of stored rows; with --compare, fail if a method became worse."""
+    from gripbench.bench.leaderboard import build, read, write
+    from gripbench.bench.registry import find_scenario, load_suite
+    from gripbench.bench.regressions import changes_table
+    from gripbench.bench.regressions import compare as compare_leaderboards
+    from gripbench.bench.store import read_rows, write_atomically
+    from gripbench.bench.tables import format_of, render, show
+    from gripbench.bench.timings import read_timings
+    from gripbench.errors import InputError
+
+    base = read(compare) if compare is not None else None  # before --out may replace it
+    if report is not None:
+        format_of(report)
+    names = [find_scenario(item).name for item in load_suite(suite).scenarios] if suite else []
+    rows = read_rows(results, tuple(names))
+    if rows.empty:
+        raise InputError(f"{results}: no stored rows to rank; 'gripbench run' makes them")
+    current, boards = build(rows, read_timings(timings) if timings else None, confidence)
+    for path in write(out or results, current, boards):
+        print(f"wrote {path}")
+    if base is None:
+        return
+    changes = compare_leaderboards(base, current, factor, margin, confidence)
+    table = changes_table(changes)
+    show(table)
+    if report is not None:
+        report.parent.mkdir(parents=True, exist_ok=True)
+        write_atomically(report, render(table, format_of(report)))
+    if base.runtimes and not current.runtimes:
+        print("Runtimes were not compared: give --timings.")
+    if any(change.regression for change in changes):
+        raise typer.Exit(1)

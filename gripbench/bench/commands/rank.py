@@ -1,0 +1,71 @@
+"""`gripbench rank`: the stored rows as ranked boards."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gripbench.bench.store import DEFAULT_RESULTS
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("rank")(rank)
+
+
+def rank(
+    results: Annotated[Path, typer.Option(help="Folder of the stored rows.")] = DEFAULT_RESULTS,
+    target: Annotated[
+        list[str] | None, typer.Option(help="Signal to rank by; repeat for more. All by default.")
+    ] = None,
+    sensors: Annotated[
+        str,
+        typer.Option(
+            help="Instruments that a method may read, with commas between; 'any': all methods on "
+            "one board. By default one board for each set of instruments."
+        ),
+    ] = "",
+    scenario: Annotated[
+        list[str] | None, typer.Option(help="Only this scenario; repeat for more.")
+    ] = None,
+    method: Annotated[
+        list[str] | None, typer.Option(help="Only this method (its label); repeat for more.")
+    ] = None,
+    reference: Annotated[
+        str, typer.Option(help="Method whose score is 1; by default the board's geometric mean.")
+    ] = "",
+    confidence: Annotated[float, typer.Option(help="Confidence of ranks and intervals.")] = 0.95,
+    format_: Annotated[
+        str, typer.Option("--format", help="terminal, text, markdown, csv, latex or html.")
+    ] = "terminal",
+    wide: Annotated[bool, typer.Option("--wide", help="With the scores beside RMS.")] = False,
+    wins: Annotated[bool, typer.Option("--wins", help="Also who wins against whom.")] = False,
+) -> None:
+    """Rank the methods of stored rows with the confidence that their runs allow."""
+    from gripbench.bench.board_tables import board_table, wins_table
+    from gripbench.bench.ranking import boards
+    from gripbench.bench.store import read_rows
+    from gripbench.bench.tables import show
+    from gripbench.errors import InputError
+
+    rows = read_rows(results, tuple(scenario or ()))
+    if rows.empty:
+        raise InputError(f"{results}: no stored rows to rank; 'gripbench run' makes them")
+    found = boards(
+        rows,
+        target or (),
+        sensors,
+        scenarios=scenario or (),
+        labels=method or (),
+        reference=reference,
+        confidence=confidence,
+    )
+    for number, board in enumerate(found):
+        if number:
+            print()
+        show(board_table(board, wide=wide), format_)
+        if wins:
+            print()
+            show(wins_table(board), format_)
