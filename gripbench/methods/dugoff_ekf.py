@@ -17,6 +17,9 @@ Errata, corrected by default; the parameter in brackets restores the printed for
 - (12): the correction starts from the forecast x(k|k-1), printed is x(k-1|k-1) twice
   (`printed_update`); H is the Jacobian of h, not of f.
 
+One improvement on the paper: the prediction takes the midpoint rule over the mean of two samples'
+inputs instead of forward Euler on the older ones (`printed_step`).
+
 The output v_x is a measurement of this filter, though none of the sensors that the paper lists
 gives it; here it is the channel of an optical speed sensor.
 """
@@ -50,8 +53,8 @@ DUGOFF_STATE = np.dtype(
 
 DUGOFF_PARAMETERS = (
     Parameter("friction", 0.8, "-", "Friction coefficient that the tyre model assumes", 0.01, 2.0),
-    Parameter("speed_x_walk", 1e-2, "m^2/s^3", "Process noise of v_x", 0.0),
-    Parameter("speed_y_walk", 0.3, "m^2/s^3", "Process noise of v_y", 0.0),
+    Parameter("speed_x_walk", 2e-2, "m^2/s^3", "Process noise of v_x", 0.0),
+    Parameter("speed_y_walk", 0.15, "m^2/s^3", "Process noise of v_y", 0.0),
     Parameter("yaw_rate_walk", 1e-2, "rad^2/s^3", "Process noise of the yaw rate", 0.0),
     Parameter("speed_x_noise", 0.05, "m/s", "Noise of the speed sensor", 1e-9),
     Parameter("yaw_rate_noise", 1.745e-3, "rad/s", "Noise of the yaw rate sensor", 1e-9),
@@ -59,6 +62,7 @@ DUGOFF_PARAMETERS = (
     Parameter("lowest_speed", 2.0, "m/s", "Speed below which the slips are held at it", 0.1),
     Parameter("correction", 1.0, "-", "0: the model alone, open loop", 0.0, 1.0),
     Parameter("load_transfer_track", 1.0, "-", "Share of the track in eq. 6", 0.1, 2.0),
+    Parameter("printed_step", 0.0, "-", "1: forward Euler step", 0.0, 1.0),
     Parameter("printed_slip", 0.0, "-", "1: 1 - lambda in eq. 2 and 4", 0.0, 1.0),
     Parameter("printed_jacobian", 0.0, "-", "1: F of eq. 11 without the tyres", 0.0, 1.0),
     Parameter("printed_update", 0.0, "-", "1: eq. 12 from x(k-1|k-1)", 0.0, 1.0),
@@ -133,8 +137,22 @@ def evaluate(state, params):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _predict(state, params, elapsed):  # type: ignore[no-untyped-def]
-    """Forward Euler step of eq. 11 from the model's last evaluation."""
+def _read_inputs(state, obs, params, share):  # type: ignore[no-untyped-def]
+    """Move the inputs by a share of the way to those of a sample."""
+    state.steer_angle += share * (obs.steer_angle - state.steer_angle)
+    state.accel_x += share * (obs.accel_x - state.accel_x)
+    state.accel_y += share * (obs.accel_y - state.accel_y)
+    rolling, radius = state.rolling, params.wheel_radius
+    rolling[0] += share * (radius * obs.wheel_speed_front_left - rolling[0])
+    rolling[1] += share * (radius * obs.wheel_speed_front_right - rolling[1])
+    rolling[2] += share * (radius * obs.wheel_speed_rear_left - rolling[2])
+    rolling[3] += share * (radius * obs.wheel_speed_rear_right - rolling[3])
+
+
+@compiled
+def _predict(state, obs, params):  # type: ignore[no-untyped-def]
+    """Advance states and covariance to a sample (eq. 11) from the model's last evaluation."""
+    elapsed = obs.time - state.time
     filter = state.filter
     x = filter.x
     for i in range(3):
@@ -148,9 +166,17 @@ def _predict(state, params, elapsed):  # type: ignore[no-untyped-def]
     filter.Q[1, 1] = params.speed_y_walk * elapsed
     filter.Q[2, 2] = params.yaw_rate_walk * elapsed
     predict_covariance(filter)
-    if params.printed_update == 0.0 or params.correction == 0.0:
+    if params.printed_update > 0.0 and params.correction > 0.0:
+        return
+    speed_x, speed_y, yaw_rate = x[0], x[1], x[2]
+    if params.printed_step == 0.0:
         for i in range(3):
-            x[i] += elapsed * state.rate[i]
+            x[i] += 0.5 * elapsed * state.rate[i]
+        _read_inputs(state, obs, params, 0.5)
+        evaluate(state, params)
+    x[0] = speed_x + elapsed * state.rate[0]
+    x[1] = speed_y + elapsed * state.rate[1]
+    x[2] = yaw_rate + elapsed * state.rate[2]
 
 
 @compiled
@@ -181,17 +207,12 @@ def _step(state, obs, params, est):  # type: ignore[no-untyped-def]
         P[1, 1] = params.speed_y_std**2
         P[2, 2] = params.yaw_rate_noise**2
     else:
-        _predict(state, params, obs.time - state.time)
+        _predict(state, obs, params)
         if params.correction > 0.0:
             _correct(state, obs, params)
     state.samples += 1.0
     state.time = obs.time
-    state.steer_angle = obs.steer_angle
-    state.accel_x, state.accel_y = obs.accel_x, obs.accel_y
-    state.rolling[0] = params.wheel_radius * obs.wheel_speed_front_left
-    state.rolling[1] = params.wheel_radius * obs.wheel_speed_front_right
-    state.rolling[2] = params.wheel_radius * obs.wheel_speed_rear_left
-    state.rolling[3] = params.wheel_radius * obs.wheel_speed_rear_right
+    _read_inputs(state, obs, params, 1.0)
     evaluate(state, params)
 
     forward = max(x[0], params.lowest_speed)
@@ -265,11 +286,13 @@ class DugoffEkf(CompiledMethod):
     parameters = DUGOFF_PARAMETERS
     variants = {  # noqa: RUF012
         "paper": {
+            "printed_step": 1.0,
             "load_transfer_track": 0.5,
             "printed_slip": 1.0,
             "printed_jacobian": 1.0,
             "printed_update": 1.0,
         },
+        "paper_step": {"printed_step": 1.0},
         "paper_slip": {"printed_slip": 1.0},
         "paper_load_transfer": {"load_transfer_track": 0.5},
         "paper_jacobian": {"printed_jacobian": 1.0},
