@@ -66,7 +66,7 @@ def simulation_of(scenario: Scenario, vehicle: Vehicle | None = None) -> Simulat
     return WORLDS[scenario.world].simulation(scenario, vehicle or load_vehicle(scenario.vehicle))
 
 
-def record(scenario: Scenario, seed: int) -> Recording:
+def record(scenario: Scenario, seed: int, vehicle: Vehicle | None = None) -> Recording:
     """Simulate a scenario once and measure it with the scenario's sensors.
 
     Parameters
@@ -75,8 +75,10 @@ def record(scenario: Scenario, seed: int) -> Recording:
         What to run.
     seed
         Seed of all randomness of the run; the same seed gives the same bytes.
+    vehicle
+        Vehicle to run; the scenario's own unless one is given.
     """
-    vehicle = load_vehicle(scenario.vehicle)
+    vehicle = vehicle or load_vehicle(scenario.vehicle)
     simulation = simulation_of(scenario, vehicle)
     truth = simulation.run(seed)
     suite = SensorSuite(scenario.all_sensors(), simulation.truth_type, simulation.sample_time, seed)
