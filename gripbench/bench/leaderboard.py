@@ -105,7 +105,7 @@ def build(
             confidence=confidence,
             boards=tuple(_content(board) for board in found),
             runtimes={label: dict(forms) for label, forms in (timings or {}).items()},
-            runs=tuple(_runs(rows)),
+            runs=tuple(runs_of(rows)),
         ),
         found,
     )
@@ -214,7 +214,8 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _runs(rows: pd.DataFrame) -> list[Runs]:
+def runs_of(rows: pd.DataFrame) -> list[Runs]:
+    """Return what every method did in every run, by scenario, target and label."""
     runs = []
     known = rows[rows["target"] != ""]
     for (scenario, target, label), group in known.groupby(["scenario", "target", "label"]):

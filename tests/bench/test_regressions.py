@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from synthetic_rows import noisy_rows, row
 
-from gripbench.bench.leaderboard import build
+from gripbench.bench.leaderboard import Leaderboard, runs_of
 from gripbench.bench.regressions import changes_table, compare
 from gripbench.bench.rows import frame_of
 from gripbench.bench.timings import RelativeRuntime
@@ -12,7 +12,14 @@ from gripbench.errors import InputError
 
 
 def board(rows, timings=None):
-    return build(frame_of(rows), timings)[0]
+    """What a comparison looks at; the boards themselves are not needed for it."""
+    return Leaderboard(
+        gripbench="0",
+        confidence=0.95,
+        boards=(),
+        runtimes=timings or {},
+        runs=runs_of(frame_of(rows)),
+    )
 
 
 def scaled(rows, label, factor, noise=0.0, scenario=None, seed=5):
@@ -84,7 +91,7 @@ def test_only_common_seeds_are_compared(rows):
     more = rows + [row("a", seed, 1e3, scenario) for seed in (30, 31)
                    for scenario in ("step", "hill")]  # fmt: skip
     fewer = [item for item in rows if item.seed >= 10]
-    base = build(frame_of(rows))[0]
+    base = board(rows)
     assert compare(base, base.model_copy(update={"runs": board(fewer).runs})) == []
     added = compare(base, base.model_copy(update={"runs": board(more).runs}))
     assert added == []
