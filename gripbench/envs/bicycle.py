@@ -26,6 +26,7 @@ from gripbench.envs.road import lay_road, stream
 from gripbench.envs.signals import record_type
 from gripbench.envs.simulation import Action, Simulation
 from gripbench.envs.vehicles import GRAVITY, Vehicle, require
+from gripbench.errors import InputError
 
 PARAMETERS = (
     "mass",
@@ -183,7 +184,7 @@ def _write(run, k, truth, at):  # type: ignore[no-untyped-def]
 def begin(run, speed, truth):  # type: ignore[no-untyped-def]
     """Put the vehicle at the origin of the track at a speed [m/s]; write the first sample."""
     run.state[plant.V_X] = speed
-    run.inputs[plant.GRAVITY_Z] = GRAVITY
+    run.inputs[plant.NORMAL] = GRAVITY
     run.inputs[plant.MU : plant.MU + 4] = 1e3  # no limit to what the driver may ask for
     _feel_bank(run)
     _write(run, 0, truth, 0)
@@ -274,6 +275,8 @@ class BicycleSimulation(Simulation):
 
     def advance(self, action: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
         """Steer to an angle within one sample time; return the sample at its end, shape (1,)."""
+        if not np.isfinite(action).all():
+            raise InputError(f"the action {action} is not finite")
         after = np.zeros(1, TRUTH)
         self._sample += 1
         finite = act(self._run, self._sample, self._parts, float(action[0]), after, 0)

@@ -199,7 +199,7 @@ def steer_along(x, u, p, driver, path, memory):  # type: ignore[no-untyped-def]
     aim = wrapped(math.atan2(target_y, target_x) - x[plant.YAW] - drift)
     curvature = 2.0 * math.sin(aim) / max(math.hypot(target_x, target_y), 1.0)
     mu = 0.5 * (u[plant.MU] + u[plant.MU + 1])
-    grip = mu * u[plant.GRAVITY_Z]
+    grip = mu * u[plant.NORMAL]
     softness_front = p.mass_front / (2.0 * p.tyre_y_front)
     softness_rear = p.mass_rear / (2.0 * p.tyre_y_rear)
     # Bank pushes sideways too: the tyres carry it besides the wanted acceleration.
@@ -249,7 +249,7 @@ def command(time, x, u, p, driver, planned, path, memory, action):  # type: igno
         v_x = x[plant.V_X]
         wanted = driver.speed_gain * (planned[1] - v_x) - u[plant.GRAVITY_X]
         wanted = min(max(wanted, -driver.accel_limit), driver.accel_limit)
-        held = p.drag * v_x * abs(v_x) + p.rolling_resistance * p.mass * u[plant.GRAVITY_Z]
+        held = p.drag * v_x * abs(v_x) + p.rolling_resistance * p.mass * u[plant.NORMAL]
         torque = (p.mass * wanted + held) * p.wheel_radius
         wheels_front = 0.5 * (p.drive_share_front if torque > 0.0 else p.brake_share_front)
     for i in range(4):

@@ -16,6 +16,7 @@ from gripbench.envs.planar_truth import TRUTH
 from gripbench.envs.road import MagneticField, disturb_field, lay_road, stream
 from gripbench.envs.simulation import Action, Simulation
 from gripbench.envs.vehicles import Vehicle
+from gripbench.errors import InputError
 
 WHEELS = ("front_left", "front_right", "rear_left", "rear_right")
 
@@ -97,6 +98,8 @@ class PlanarSimulation(Simulation):
 
     def advance(self, action: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
         """Hold an action for one sample time; return the sample at its end, shape (1,)."""
+        if not np.isfinite(action).all():
+            raise InputError(f"the action {action} is not finite")
         after = np.zeros(1, TRUTH)
         self._sample += 1
         given = np.array(action, dtype=np.float64)

@@ -26,7 +26,7 @@ from gripbench.errors import InputError
 V_X, V_Y, YAW_RATE, WHEEL, ROLL, ROLL_RATE, LAGGED_X, LAGGED_Y = 0, 1, 2, 3, 7, 8, 9, 10
 YAW, X, Y, DISTANCE, STEER, STATES = 11, 12, 13, 14, 15, 16
 
-STEER_RATE, TORQUE, MU, GRAVITY_X, GRAVITY_Y, GRAVITY_Z = 0, 1, 5, 9, 10, 11
+STEER_RATE, TORQUE, MU, GRAVITY_X, GRAVITY_Y, NORMAL = 0, 1, 5, 9, 10, 11
 YAW_OFFSET, YAW_GAIN, ALONG_X, ALONG_Y, ACROSS_Y = 12, 13, 14, 15, 16
 BANK, GRADE, BANK_RATE, GRADE_RATE, GROWTH, INPUTS = 17, 18, 19, 20, 21, 25
 
@@ -39,7 +39,7 @@ STEP = 1e-3
 SLOW_ROLLING = 1.0
 """Rolling speed [m/s] below which the denominator of the slip is regularised."""
 
-SLOW_SPIN = 1.0
+SLOW_SPIN = 0.2
 """Wheel speed [rad/s] within which brake torque passes through zero."""
 
 _MOST_PARTS = 100  # of a step
@@ -187,13 +187,13 @@ def wheel_forces(x, u, p, wheels):  # type: ignore[no-untyped-def]
     moment = 0.0
     for i in range(4):
         if i < 2:
-            axle = u[GRAVITY_Z] * p.mass_front - transfer
+            axle = u[NORMAL] * p.mass_front - transfer
             aside = x[LAGGED_Y] * p.transfer_front
             offset_x = p.cg_to_front
             offset_y = 0.5 * p.track_front
             stiffness = p.tyre_y_front
         else:
-            axle = u[GRAVITY_Z] * p.mass_rear + transfer
+            axle = u[NORMAL] * p.mass_rear + transfer
             aside = x[LAGGED_Y] * p.transfer_rear
             offset_x = -p.cg_to_rear
             offset_y = 0.5 * p.track_rear
@@ -253,11 +253,11 @@ def hold_stiffness(x, p, u):  # type: ignore[no-untyped-def]
     transfer = x[LAGGED_X] * p.transfer_x
     for i in range(4):
         if i < 2:
-            axle = u[GRAVITY_Z] * p.mass_front - transfer
+            axle = u[NORMAL] * p.mass_front - transfer
             aside = x[LAGGED_Y] * p.transfer_front
             nominal = 0.5 * GRAVITY * p.mass_front
         else:
-            axle = u[GRAVITY_Z] * p.mass_rear + transfer
+            axle = u[NORMAL] * p.mass_rear + transfer
             aside = x[LAGGED_Y] * p.transfer_rear
             nominal = 0.5 * GRAVITY * p.mass_rear
         if i % 2 == 1:
@@ -318,7 +318,8 @@ def parts_of_step(x, u, p):  # type: ignore[no-untyped-def]
         spin = x[WHEEL + i]
         if abs(spin) < 10.0 * SLOW_SPIN:
             near = spin * spin + SLOW_SPIN * SLOW_SPIN
-            stiffest = max(stiffest, tyre - min(u[TORQUE + i], 0.0) / (near * math.sqrt(near)))
+            steepness = SLOW_SPIN * SLOW_SPIN / (near * math.sqrt(near))
+            stiffest = max(stiffest, tyre - min(u[TORQUE + i], 0.0) * steepness)
     return int(min(math.ceil(stiffest / p.spin_inertia * STEP / _STIFFEST), _MOST_PARTS))
 
 

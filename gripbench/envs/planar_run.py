@@ -21,7 +21,7 @@ TERMINATIONS = ("", "spin", "roll_over", "stop", "off_road", "diverged")
 
 HEADING, NORTH, UP, STOP_SPEED, ROADSIDE, SITE = 0, 1, 2, 3, 4, 5
 
-_SPUN = math.radians(75.0)  # sideslip, or angle to the path, that nobody steers back from
+_SPUN = math.radians(60.0)  # sideslip, or angle to the path, that nobody steers back from
 _SPUN_SPEED = 2.0  # slower than this a vehicle turns on the spot without having spun
 
 
@@ -118,6 +118,8 @@ def decide(run, k):  # type: ignore[no-untyped-def]
 def act(run, k, parts, action, truth, columns, at):  # type: ignore[no-untyped-def]
     """Hold an action up to sample `k`, write that sample into row `at`; return a code.
 
+    A state that is not finite is not written.
+
     Parameters
     ----------
     run
@@ -140,6 +142,9 @@ def act(run, k, parts, action, truth, columns, at):  # type: ignore[no-untyped-d
     for _ in range(parts):
         plant.advance_step(x, u, p, run.wheels, run.work)
         feel_road(x, p, run.friction[0], run.profile, u)
+    for j in range(plant.STATES):
+        if not math.isfinite(x[j]):
+            return DIVERGED
     if run.path.shape[0] > 0:
         find_on_path(x, run.path, run.memory)
     _write(run, k, truth, columns, at)
@@ -155,7 +160,7 @@ def roll_out(run, parts, truth, columns):  # type: ignore[no-untyped-def]
         decide(run, k - 1)
         code = act(run, k, parts, run.action, truth, columns, k)
         if code == DIVERGED:
-            break  # the sample is not finite and does not count
+            break  # nothing was written
         count = k + 1
         if code != GOES_ON:
             break
@@ -176,9 +181,6 @@ def _write(run, k, truth, columns, at):  # type: ignore[no-untyped-def]
 def _end_of(run):  # type: ignore[no-untyped-def]
     """Return the code of the reason to end here, `GOES_ON` if there is none."""
     x, wheels = run.state, run.wheels
-    for j in range(plant.STATES):
-        if not math.isfinite(x[j]):
-            return DIVERGED
     on_path = run.path.shape[0] > 0
     speed = math.hypot(x[plant.V_X], x[plant.V_Y])
     if speed > _SPUN_SPEED:

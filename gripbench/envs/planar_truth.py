@@ -115,7 +115,7 @@ def write_truth(time, x, u, p, heading, north, up, disturbance, wheels, dx, row,
     # Specific force in the axes of the road, turned into those of the body by its lean and roll.
     along = force_x / p.mass
     across = force_y / p.mass
-    normal = u[plant.GRAVITY_Z]
+    normal = u[plant.NORMAL]
     row.accel_x = math.cos(lean) * along - math.sin(lean) * normal
     tilted = math.sin(lean) * along + math.cos(lean) * normal
     row.accel_y = math.cos(x[plant.ROLL]) * across + math.sin(x[plant.ROLL]) * tilted

@@ -217,9 +217,14 @@ def feel_road(x, p, friction, profile, u):  # type: ignore[no-untyped-def]
     sin_grade = math.sin(grade)
     u[plant.GRAVITY_X] = GRAVITY * sin_grade
     u[plant.GRAVITY_Y] = -GRAVITY * cos_grade * sin_bank
-    u[plant.GRAVITY_Z] = GRAVITY * cos_grade * cos_bank
     u[plant.YAW_GAIN] = 1.0 / (cos_grade * cos_bank)
     u[plant.YAW_OFFSET] = u[plant.GRADE_RATE] * sin_bank * u[plant.YAW_GAIN]
+    # The road turns under the vehicle: a dip or a banked turn presses it onto its wheels.
+    turning = u[plant.YAW_GAIN] * x[plant.YAW_RATE] + u[plant.YAW_OFFSET]
+    rolling = u[plant.BANK_RATE] - turning * sin_grade
+    pitching = u[plant.GRADE_RATE] * cos_bank + turning * cos_grade * sin_bank
+    pressed = rolling * x[plant.V_Y] - pitching * x[plant.V_X]
+    u[plant.NORMAL] = max(GRAVITY * cos_grade * cos_bank + pressed, 0.0)
     u[plant.ALONG_X] = cos_grade
     u[plant.ALONG_Y] = sin_grade * sin_bank
     u[plant.ACROSS_Y] = cos_bank
