@@ -17,6 +17,8 @@ from gripbench.methods.contract import Parameter
 
 _inline = numba.njit(inline="always", error_model="numpy")
 
+LARGEST_COVARIANCE = 1e100
+
 RLS_PARAMETERS = (
     Parameter("memory_time", 0.5, "s", "Time constant of forgetting; 0: `forgetting` is used", 0.0),
     Parameter("forgetting", 0.9, "-", "Forgetting factor a sample, lambda", 0.5, 1.0),
@@ -65,7 +67,9 @@ def rls(theta, covariance, regressor, output, forgetting):  # type: ignore[no-un
     innovation = output - regressor * theta
     weight = forgetting + regressor * covariance * regressor
     gain = covariance * regressor / weight
-    return theta + gain * innovation, (covariance - gain * regressor * covariance) / forgetting
+    # eq. 14 for one parameter, (P - K phi P)/lambda, is P/weight: nothing cancels. Without
+    # excitation P grows by 1/lambda a sample; it must not overflow while a vehicle stands.
+    return theta + gain * innovation, min(covariance / weight, LARGEST_COVARIANCE)
 
 
 @_inline
