@@ -45,6 +45,7 @@ VEHICLE_PARAMETERS: dict[str, ParameterRange] = {
     "cg_height": ParameterRange("m", 0.01, 5.0, "Height of centre of gravity above the road"),
     "track_front": ParameterRange("m", 0.05, 5.0, "Track: distance between the front wheels"),
     "track_rear": ParameterRange("m", 0.05, 5.0, "Track: distance between the rear wheels"),
+    "steering_ratio": ParameterRange("-", 1.0, 50.0, "Steering wheel's angle over the wheels'"),
     "wheel_radius": ParameterRange("m", 0.01, 2.0, "Effective rolling radius"),
     "wheel_inertia": ParameterRange("kg m^2", 1e-6, 100.0, "Moment of inertia of an axle's wheels"),
     "drag": ParameterRange("kg/m", 0.0, 10.0, "Wind drag: force over speed squared"),
