@@ -31,21 +31,24 @@ def board_table(board: Board, timings: Timings | None = None, wide: bool = False
         With the scores beside RMS: peak, bias, convergence, RMS by utilisation, deadlines.
     """
     unit = signal(board.target).unit.replace("-", "")
+    percent = f"{100.0 * board.confidence:g} %"
     columns = [
         Column("rank", "Rank", format="d"),
-        Column("ranks", "95 %"),
+        Column("ranks", f"Ranks ({percent})"),
         Column("group", "Group"),
         Column("name", "Method"),
+        *((Column("reads", "Reads"),) if not board.sensors else ()),
         Column("score", "Score", format=".3f", best="lowest", tied="tied"),
-        Column("scores", "interval"),
+        Column("scores", f"Score ({percent})"),
         Column("rms", "RMS", unit, ".4g"),
-        Column("rmses", "interval of RMS", unit),
+        Column("rmses", f"RMS ({percent})", unit),
     ]
     if wide:
         columns += [
             Column("peak", "Peak", unit, ".4g"),
             Column("bias", "Bias", unit, "+.3g"),
             Column("convergence", "Convergence", "s"),
+            Column("converged_share", "Converged", "% of runs", ".0f"),
             *(
                 Column(f"rms_{band}", f"RMS {_band(low, high)}", unit, ".4g")
                 for band, low, high in UTILISATION_BANDS
@@ -109,6 +112,7 @@ def _row(line: Mapping[Any, Any], timings: Timings) -> dict[str, Any]:
         "scores": _range(line["score_from"], line["score_to"], ".3f"),
         "rmses": _range(line["rms_from"], line["rms_to"], ".4g"),
         "tied": line["rank_from"] == 1 and line["failures"] == 0,
+        "converged_share": _times(line["converged"], 100.0),
         "convergence": _convergence(line["convergence_time"]),
         "relative": runtime.relative if runtime else None,
         "step": _times(line["step_batch"], 1e9),

@@ -48,6 +48,8 @@ class Board:
         Instruments that a method on this board may read; empty with `ANY`.
     title
         Target and instruments in words.
+    confidence
+        Confidence of all its claims together, and of each interval.
     scenarios
         Names of the scenarios.
     seeds
@@ -66,6 +68,7 @@ class Board:
     target: str
     sensors: tuple[str, ...]
     title: str
+    confidence: float
     scenarios: tuple[str, ...]
     seeds: tuple[int, ...]
     lines: pd.DataFrame
@@ -210,6 +213,7 @@ def _board(
         target=target,
         sensors=allowed or (),
         title=f"{target} with {'any sensors' if allowed is None else ', '.join(allowed)}",
+        confidence=settings.confidence,
         scenarios=tuple(sorted((*grid.scenarios, *grid.single))),
         seeds=grid.seeds,
         lines=lines,

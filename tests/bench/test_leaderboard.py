@@ -96,7 +96,7 @@ def test_written_leaderboard_reads_back_and_is_the_same_bytes_again(rows, tmp_pa
     assert again.runtimes == runtimes
     assert again.runs == made.runs
     methods = [[line["label"] for line in board["methods"]] for board in again.boards]
-    assert methods == [["a", "b:paper", "c"], ["g", "a", "b:paper", "c"]]
+    assert methods == [["a", "b:paper", "c"], *[["g", "a", "b:paper", "c"]] * 2]
 
 
 def test_markdown_and_csv_hold_every_board_and_the_failures(rows, tmp_path):
@@ -104,14 +104,17 @@ def test_markdown_and_csv_hold_every_board_and_the_failures(rows, tmp_path):
     write(tmp_path, made, found)
     text = (tmp_path / "leaderboard.md").read_text()
     titles = [line for line in text.splitlines() if line.startswith("## ")]
-    assert len(titles) == 2
+    assert len(titles) == 3
+    assert titles[2] == "## mu_front with any sensors"
     assert "GPS receiver" in titles[1]
     assert "GPS receiver" not in titles[0]
     assert "failed: ValueError: no" in text
     assert "Step [reference kernels]" in text
     with (tmp_path / "leaderboard.csv").open() as file:
         lines = list(csv.DictReader(file))
-    assert [line["label"] for line in lines] == ["a", "b:paper", "c", "g", "a", "b:paper", "c"]
+    assert [line["label"] for line in lines] == [
+        "a", "b:paper", "c", "g", "a", "b:paper", "c", "g", "a", "b:paper", "c",
+    ]  # fmt: skip
     assert float(lines[0]["relative_batch"]) == made.runtimes["a"]["batch"].relative
     assert lines[2]["score"] == ""
     assert lines[2]["failures"] == "12"

@@ -34,7 +34,14 @@ def drive_for(spec):
     pytest.skip(f"{spec.label}: {reason}")
 
 
-@pytest.mark.parametrize("name", built_in_methods())
+def choices():
+    """Every method with each of its variants."""
+    for name, method in built_in_methods().items():
+        yield name
+        yield from (f"{name}:{variant}" for variant in method.variants)
+
+
+@pytest.mark.parametrize("name", choices())
 @pytest.mark.benchmark(group="batch")
 def test_batch_step(benchmark, name):
     spec = choose_method(name)
