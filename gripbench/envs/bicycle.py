@@ -19,8 +19,18 @@ from pydantic import model_validator
 
 from gripbench.envs import planar_plant as plant
 from gripbench.envs.driven import DrivenScenario
-from gripbench.envs.path_drivers import command, find_on_path, wrapped
-from gripbench.envs.planar_run import HEADING, Run, allocate
+from gripbench.envs.path_drivers import OFFSET, command, find_on_path, wrapped
+from gripbench.envs.planar_run import (
+    GOES_ON,
+    HEADING,
+    OFF_ROAD,
+    ROADSIDE,
+    SPIN,
+    SPUN,
+    TERMINATIONS,
+    Run,
+    allocate,
+)
 from gripbench.envs.road import SPACING as ROAD_SPACING
 from gripbench.envs.road import lay_road, stream
 from gripbench.envs.signals import record_type
@@ -202,7 +212,7 @@ def decide(run, k):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
 def act(run, k, parts, steer, truth, at):  # type: ignore[no-untyped-def]
-    """Steer to an angle [rad] up to sample `k`, write it into row `at`; return if it is finite."""
+    """Steer to an angle [rad] up to sample `k`, write that into row `at`; return a code."""
     x, u, p = run.state, run.inputs, run.plant[0]
     wanted = min(max(steer, -p.steer_limit), p.steer_limit)
     rate = (wanted - x[plant.STEER]) / run.driver[0].sample_time
@@ -225,17 +235,23 @@ def act(run, k, parts, steer, truth, at):  # type: ignore[no-untyped-def]
     if run.path.shape[0] > 0:
         find_on_path(x, run.path, run.memory)
     _write(run, k, truth, at)
-    return math.isfinite(x[plant.V_Y] + x[plant.YAW_RATE] + x[plant.X] + x[plant.Y])
+    # Beyond the critical speed of an oversteering vehicle the linear equations grow for ever.
+    if abs(math.atan2(x[plant.V_Y], x[plant.V_X])) > SPUN:
+        return SPIN
+    if run.path.shape[0] > 0 and abs(run.memory[OFFSET]) > run.site[ROADSIDE]:
+        return OFF_ROAD
+    return GOES_ON
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
 def roll_out(run, parts, truth):  # type: ignore[no-untyped-def]
-    """Run from the first sample to the end; return the number of finite samples."""
+    """Run from the first sample to the end; return the number of samples and a code."""
     for k in range(1, truth.shape[0]):
         decide(run, k - 1)
-        if not act(run, k, parts, run.action[0], truth, k):
-            return k
-    return truth.shape[0]
+        code = act(run, k, parts, run.action[0], truth, k)
+        if code != GOES_ON:
+            return k + 1, code
+    return truth.shape[0], GOES_ON
 
 
 class BicycleSimulation(Simulation):
@@ -279,17 +295,17 @@ class BicycleSimulation(Simulation):
             raise InputError(f"the action {action} is not finite")
         after = np.zeros(1, TRUTH)
         self._sample += 1
-        finite = act(self._run, self._sample, self._parts, float(action[0]), after, 0)
-        self.termination = "" if finite else "diverged"
+        code = act(self._run, self._sample, self._parts, float(action[0]), after, 0)
+        self.termination = TERMINATIONS[code]
         return after
 
     def run(self, seed: int) -> npt.NDArray[Any]:
-        """Run to the horizon under the scenario's driver."""
+        """Run to the horizon or termination under the scenario's driver."""
         samples = np.zeros(self._scenario.steps + 1, TRUTH)
         self._start(seed)
         begin(self._run, self._scenario.speed, samples)
-        count = roll_out(self._run, self._parts, samples)
-        self.termination = "" if count == len(samples) else "diverged"
+        count, code = roll_out(self._run, self._parts, samples)
+        self.termination = TERMINATIONS[code]
         return samples[:count]
 
     def fresh(self) -> BicycleSimulation:
@@ -301,6 +317,7 @@ class BicycleSimulation(Simulation):
         self.termination = ""
         self._sample = 0
         path = scenario.lay_path(seed)
+        heading = stream(seed, "heading").uniform(-math.pi, math.pi)
         ground = lay_road(scenario.road, path[:, 3], scenario.longest(), seed)
         self._run = Run(
             plant=self._plant,
@@ -310,7 +327,7 @@ class BicycleSimulation(Simulation):
             profile=ground.profile,
             path=path,
             disturbance=np.zeros((1, 3)),
-            site=np.array([stream(seed, "heading").uniform(-math.pi, math.pi), 0.0, 0.0, 0.0, 0.0]),
+            site=np.array([heading, 0.0, 0.0, 0.0, scenario.off_road]),
             **allocate(),
         )
 

@@ -21,7 +21,9 @@ TERMINATIONS = ("", "spin", "roll_over", "stop", "off_road", "diverged")
 
 HEADING, NORTH, UP, STOP_SPEED, ROADSIDE, SITE = 0, 1, 2, 3, 4, 5
 
-_SPUN = math.radians(60.0)  # sideslip, or angle to the path, that nobody steers back from
+SPUN = math.radians(60.0)
+"""Sideslip, or angle to the path, from which nobody steers back [rad]."""
+
 _SPUN_SPEED = 2.0  # slower than this a vehicle turns on the spot without having spun
 
 
@@ -184,9 +186,9 @@ def _end_of(run):  # type: ignore[no-untyped-def]
     on_path = run.path.shape[0] > 0
     speed = math.hypot(x[plant.V_X], x[plant.V_Y])
     if speed > _SPUN_SPEED:
-        if abs(math.atan2(x[plant.V_Y], x[plant.V_X])) > _SPUN:
+        if abs(math.atan2(x[plant.V_Y], x[plant.V_X])) > SPUN:
             return SPIN
-        if on_path and abs(run.memory[ASTRAY]) > _SPUN:
+        if on_path and abs(run.memory[ASTRAY]) > SPUN:
             return SPIN
     lifted = plant.UNCLIPPED_LOAD
     if (wheels[0, lifted] < 0.0 and wheels[2, lifted] < 0.0) or (
