@@ -125,6 +125,9 @@ class Column(Configuration):
         Column that is not 0 in the rows with a new sample.
     time
         Column with this channel's own time, on the file's clock; empty: the file's time.
+    rate_over
+        Take the column's change over the last so many seconds, per second, instead of its value;
+        `unit` is then that of the rate. 0: the value.
     delay
         Age [s] of the value at its time. An observation stays where it arrived, for GPS the
         channel `gps_time` tells its age; a reference is moved back to when it was true.
@@ -143,6 +146,7 @@ class Column(Configuration):
     new_when: Name = ""
     new_where: Name = ""
     time: Name = ""
+    rate_over: float = Field(default=0.0, ge=0.0, le=60.0)
     delay: float = Field(default=0.0, ge=0.0, le=10.0)
     zero: Literal["", "standstill", "straight"] = ""
 
@@ -194,6 +198,12 @@ class Derived(Configuration):
         it can give.
     sideslip_above
         Speed [m/s] from which the sideslip follows from v_y and v_x; below, it means nothing.
+    reference_ahead
+        Distance [m] of the point whose velocity the reference gives before the centre of gravity;
+        its `speed_y` is brought there with the yaw rate.
+    gps_velocity
+        Whether the channels `velocity_north` and `velocity_west` follow from `speed_gps` and
+        `course`.
     instruments
         Channels that a method may read although they come from the reference: motion capture in
         the place of a speed sensor.
@@ -202,6 +212,8 @@ class Derived(Configuration):
     velocity_window: float = Field(default=0.0, ge=0.0, le=5.0)
     acceleration_window: float = Field(default=0.0, ge=0.0, le=5.0)
     sideslip_above: float = Field(default=1.0, gt=0.0)
+    reference_ahead: float = Field(default=0.0, ge=-10.0, le=10.0)
+    gps_velocity: bool = False
     instruments: tuple[str, ...] = ()
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from gripbench.envs.logs.channel_map import Derived
-from gripbench.envs.logs.series import Floats, Series
+from gripbench.envs.logs.series import Floats, Series, wrapped
 from gripbench.envs.vehicles import GRAVITY
 from gripbench.errors import InputError
 
@@ -30,6 +30,10 @@ def derive_reference(reference: dict[str, Series], derived: Derived) -> dict[str
     found = dict(reference)
     if derived.velocity_window > 0.0:
         _velocity(found, derived.velocity_window)
+    if derived.reference_ahead != 0.0:
+        left, turning = _together(found, ("speed_y", "yaw_rate"), "derived.reference_ahead")
+        moved = left.values - derived.reference_ahead * turning.values
+        found["speed_y"] = replace(left, values=moved)
     if derived.acceleration_window > 0.0:
         _acceleration(found, derived.acceleration_window)
     if "speed_x" in found and "speed_y" in found and "sideslip" not in found:
@@ -43,6 +47,32 @@ def derive_reference(reference: dict[str, Series], derived: Derived) -> dict[str
                 forward.times[moving],
                 np.arctan2(left.values, forward.values)[moving],
             )
+    if "sideslip" not in found and "course" in found and "yaw" in found:
+        course, yaw = _together(found, ("course", "yaw"), "reference.course")
+        angle = wrapped(course.values - yaw.values)
+        fast = np.ones(len(angle), dtype=bool)
+        if "speed_x" in found and np.array_equal(found["speed_x"].times, course.times):
+            fast = found["speed_x"].values >= derived.sideslip_above
+        if fast.any():
+            _add(found, "sideslip", course, course.times[fast], angle[fast])
+    return found
+
+
+def derive_channels(channels: dict[str, Series], derived: Derived) -> dict[str, Series]:
+    """Return the channels with the velocity components that follow from GPS speed and course.
+
+    Raises
+    ------
+    InputError
+        If they are asked for and speed or course is missing, or these come at different times.
+    """
+    if not derived.gps_velocity:
+        return channels
+    found = dict(channels)
+    key = "derived.gps_velocity"
+    speed, course = _together(found, ("speed_gps", "course"), key, "channels have")
+    _add(found, "velocity_north", course, course.times, speed.values * np.cos(course.values))
+    _add(found, "velocity_west", course, course.times, speed.values * np.sin(course.values))
     return found
 
 
@@ -88,6 +118,10 @@ def _velocity(found: dict[str, Series], window: float) -> None:
     _add(found, "speed_x", north, north.times, np.cos(heading) * along + np.sin(heading) * across)
     _add(found, "speed_y", north, north.times, np.cos(heading) * across - np.sin(heading) * along)
     _add(found, "yaw_rate", north, north.times, slope(yaw.times, heading, window))
+    _add(found, "velocity_north", north, north.times, along)
+    _add(found, "velocity_west", north, north.times, across)
+    _add(found, "speed_gps", north, north.times, np.hypot(along, across))
+    _add(found, "course", north, north.times, np.arctan2(across, along))
 
 
 def _acceleration(found: dict[str, Series], window: float) -> None:
@@ -101,10 +135,12 @@ def _acceleration(found: dict[str, Series], window: float) -> None:
     _add(found, "mu_used", forward, forward.times, np.hypot(ahead, aside) / GRAVITY)
 
 
-def _together(found: dict[str, Series], names: tuple[str, ...], key: str) -> list[Series]:
+def _together(
+    found: dict[str, Series], names: tuple[str, ...], key: str, who: str = "reference has"
+) -> list[Series]:
     for name in names:
         if name not in found:
-            raise InputError(f"channel map: key '{key}': the reference has no '{name}'")
+            raise InputError(f"channel map: key '{key}': the {who} no '{name}'")
     series = [found[name] for name in names]
     for other in series[1:]:
         if not np.array_equal(other.times, series[0].times):

@@ -19,7 +19,7 @@ import pandas as pd
 
 from gripbench.configuration import parse
 from gripbench.envs.logs.channel_map import ChannelMap, LogFile, load_channel_map, vehicle_values
-from gripbench.envs.logs.derivation import derive_reference
+from gripbench.envs.logs.derivation import derive_channels, derive_reference
 from gripbench.envs.logs.initial import zeroed
 from gripbench.envs.logs.quality import QualityReport, judge
 from gripbench.envs.logs.readers import Log, LogColumn, log_of_frame, read_log
@@ -192,6 +192,7 @@ def _recording(
         if key.startswith("reference.")
     }
     channels, zeros = zeroed(channels)
+    channels = derive_channels(channels, channel_map.derived)
     reference = derive_reference(reference, channel_map.derived)
     for name in channel_map.derived.instruments:
         if name not in reference:

@@ -98,6 +98,8 @@ def series_of(
     times, values = times[keep], values[keep]
     new = _new_samples(times, values, column.rate, None if marks is None else marks[finite][keep])
     times, values = times[new], values[new]
+    if column.rate_over > 0.0:
+        times, values = _change_rate(log.path, key, times, values, column.rate_over)
     return Series(
         name=name,
         key=key,
@@ -212,6 +214,17 @@ def _changed_or_due(times, values, longest):  # type: ignore[no-untyped-def]
         if new[row]:
             since = times[row]
     return new
+
+
+def _change_rate(
+    path: Path, key: str, times: Floats, values: Floats, over: float
+) -> tuple[Floats, Floats]:
+    """Return the change per second up to each sample, from that `over` seconds before it."""
+    later = times >= times[0] + over
+    if not later.any():
+        raise InputError(f"{path}: key '{key}.rate_over': the log is shorter than {over:g} s")
+    before = np.interp(times[later] - over, times, values)
+    return times[later], (values[later] - before) / over
 
 
 def _convert(
