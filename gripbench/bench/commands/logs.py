@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -9,10 +10,14 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from gripbench.bench.recorded import RecordedScore, score_published
+from gripbench.bench.tables import Column, show
+from gripbench.bench.tables import Table as Table_
 from gripbench.envs.logs.channel_map import load_channel_map
 from gripbench.envs.logs.importing import import_log
 from gripbench.envs.logs.inspection import inspect_log
 from gripbench.envs.logs.locations import VARIABLE, data_folder
+from gripbench.envs.logs.published import recording_files
 from gripbench.envs.logs.storing import store
 from gripbench.errors import InputError
 
@@ -23,6 +28,7 @@ def register(app: typer.Typer) -> None:
     data = typer.Typer(help="Files of published recordings.", no_args_is_help=True)
     data.command("path")(path)
     app.add_typer(data, name="data")
+    app.command("recordings")(recordings)
 
 
 def import_(
@@ -68,6 +74,62 @@ def path(
     print(chosen)
     if not chosen.is_dir():
         print(f"(no such folder; set {VARIABLE} to the one that has the files)")
+
+
+def recordings(
+    names: Annotated[
+        list[str] | None, typer.Argument(help="Published recordings; by default all.")
+    ] = None,
+    method: Annotated[
+        list[str] | None,
+        typer.Option(help="name[:variant][@parameter=number]; by default every built-in method."),
+    ] = None,
+    data: Annotated[
+        Path | None, typer.Option(help="Folder of the files instead of the one that is set.")
+    ] = None,
+    format: Annotated[
+        str, typer.Option(help="terminal, plain, markdown, csv, latex or html.")
+    ] = "terminal",
+) -> None:
+    """Score methods and trivial estimators on published recordings of real vehicles."""
+    scores = score_published(names or recording_files(), method or (), data)
+    scored = [score for score in scores if score.status == "ok"]
+    if scored:
+        show(_table(scored), format)
+    left_out = {(score.estimator, score.reason): None for score in scores if score.status != "ok"}
+    for estimator, reason in left_out:
+        print(f"no figure: {estimator or 'recording'}: {reason}", file=sys.stderr)
+
+
+def _table(scores: list[RecordedScore]) -> Table_:
+    rows = [
+        {
+            "recording": score.recording,
+            "target": score.target,
+            "estimator": score.estimator,
+            "kind": score.kind,
+            "measure": f"{score.measure} [{score.unit}]",
+            "value": score.value,
+            "interval": f"{score.low:.3g} to {score.high:.3g}",
+            "outside": score.outside,
+        }
+        for score in scores
+    ]
+    return Table_(
+        (
+            Column("recording", "Recording"),
+            Column("target", "Target"),
+            Column("estimator", "Estimator"),
+            Column("kind", "Kind"),
+            Column("measure", "Figure"),
+            Column("value", "Value", format=".3g"),
+            Column("interval", "95 % interval"),
+            Column("outside", "Mean distance from what is known", format=".3g"),
+        ),
+        tuple(rows),
+        caption="Methods and trivial estimators on the test windows of real recordings.",
+        group_by="recording",
+    )
 
 
 def _print_inspection(log: Path, database: str) -> None:
