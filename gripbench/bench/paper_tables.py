@@ -8,18 +8,20 @@ leaves `tolerance` around it has changed, which is an error whether or not it ma
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import exp, log, sqrt
 from pathlib import Path
-from typing import Literal, Self
+from typing import Any, Literal, Protocol, Self
 
 import numpy as np
+import numpy.typing as npt
 from pydantic import Field, model_validator
 from scipy.stats import kendalltau
 
 from gripbench.bench.registry import built_in_methods
 from gripbench.configuration import CONFIGS, Configuration, parse, read_toml
+from gripbench.envs.recordings import Recording
 from gripbench.envs.scenarios import Scenario
 from gripbench.envs.worlds import load_scenario, record
 from gripbench.methods.contract import CompiledMethod
@@ -117,6 +119,14 @@ class PaperTables(Configuration):
         return self
 
 
+class RecordingMethod(Protocol):
+    """What a reproduction needs of a method: a run over a whole recording."""
+
+    def run(self, vehicle: dict[str, float], observations: npt.NDArray[Any], /) -> npt.NDArray[Any]:
+        """Return the estimates, shape (n,)."""
+        ...
+
+
 @dataclass(frozen=True)
 class Cell:
     """One cell: the paper's value, ours, and the two verdicts."""
@@ -183,7 +193,12 @@ def load_paper_tables(name: str) -> PaperTables:
     return parse(PaperTables, read_toml(path), path)
 
 
-def reproduce(paper: PaperTables, advance: Callable[[], None] = lambda: None) -> Outcome:
+def reproduce(
+    paper: PaperTables,
+    advance: Callable[[], None] = lambda: None,
+    recorder: Callable[[Scenario, int], Recording] = record,
+    chooser: Callable[[MethodColumn, str], RecordingMethod] | None = None,
+) -> Outcome:
     """Run every method of a paper's tables on every scenario.
 
     Parameters
@@ -192,11 +207,16 @@ def reproduce(paper: PaperTables, advance: Callable[[], None] = lambda: None) ->
         The tables.
     advance
         Called after each recording, for a progress bar.
+    recorder
+        Simulates a scenario with a seed; another one shows what a setting of the world is worth.
+    chooser
+        Gives a column's method for a scenario; `method_of` unless another is given.
     """
     cells: dict[tuple[str, int, int], float] = {}
     for i, row in enumerate(paper.scenarios):
         scenario = load_scenario(row.scenario)
-        for (target, j), value in _row(paper, row, scenario, advance).items():
+        methods = [(chooser or method_of)(column, row.scenario) for column in paper.methods]
+        for (target, j), value in _row(paper, row, scenario, methods, recorder, advance).items():
             cells[target, i, j] = value
     return Outcome(
         paper,
@@ -230,13 +250,17 @@ def method_of(column: MethodColumn, scenario: str) -> CompiledMethod:
 
 
 def _row(
-    paper: PaperTables, row: ScenarioRow, scenario: Scenario, advance: Callable[[], None]
+    paper: PaperTables,
+    row: ScenarioRow,
+    scenario: Scenario,
+    methods: Sequence[RecordingMethod],
+    recorder: Callable[[Scenario, int], Recording],
+    advance: Callable[[], None],
 ) -> dict[tuple[str, int], float]:
     """Return the pooled RMS by target and column: the mean of squares over all samples."""
-    methods = [method_of(column, row.scenario) for column in paper.methods]
     squares = {(t.target, j): [0.0, 0] for t in paper.tables for j in range(len(methods))}
     for seed in range(row.seeds):
-        recording = record(scenario, seed)
+        recording = recorder(scenario, seed)
         for j, method in enumerate(methods):
             estimates = method.run(recording.vehicle, recording.observations)
             for table in paper.tables:
