@@ -39,10 +39,27 @@ def plot(
     from gripbench.bench.figures.runs import Runs
     from gripbench.bench.figures.style import save, style
 
-    chosen = [name.strip() for name in methods.split(",") if name.strip()]
+    chosen = split_methods(methods)
     if output is None:
         output = results / "plots" / f"{Path(scenario).stem}_{signal}_{seed}"
     with style():
         figure = run_plot(Runs(), scenario, chosen, signal, seed, start, end)
         paths = save(figure, output.parent, output.name.removesuffix(".png"), dpi)
     typer.echo("Written: " + ", ".join(str(path) for path in paths))
+
+
+def split_methods(text: str) -> list[str]:
+    """Return the methods in a text with commas between them; their own settings have commas too.
+
+    Examples
+    --------
+    >>> split_methods("slip_slope@forgetting=0.99,a_filter_setting=2, proposed_observer")
+    ['slip_slope@forgetting=0.99,a_filter_setting=2', 'proposed_observer']
+    """
+    found: list[str] = []
+    for part in filter(None, (part.strip() for part in text.split(","))):
+        if "=" in part and "@" not in part and found:
+            found[-1] += f",{part}"
+        else:
+            found.append(part)
+    return found

@@ -34,6 +34,11 @@ class Runs:
             self._methods[name] = choose_method(name)
         return self._methods[name]
 
+    def forget(self) -> None:
+        """Drop recordings and estimates, so that the memory of a long series of runs is bounded."""
+        self._recordings.clear()
+        self._estimates.clear()
+
     def estimates(self, scenario: str, method: str, seed: int = 0) -> npt.NDArray[Any]:
         """Return a method's estimates over a run.
 
