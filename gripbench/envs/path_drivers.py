@@ -157,7 +157,7 @@ DRIVER = np.dtype(
 )
 """What the compiled loop knows of the driver."""
 
-INDEX, ARMS, OFFSET, ASTRAY, MEMORY = 0, 1, 2, 3, 4
+INDEX, ARMS, OFFSET, ASTRAY, BEYOND, MEMORY = 0, 1, 2, 3, 4, 5
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
@@ -180,7 +180,10 @@ def find_on_path(x, path, memory):  # type: ignore[no-untyped-def]
     memory[INDEX] = i
     cos_path = math.cos(path[i, 2])
     sin_path = math.sin(path[i, 2])
-    memory[OFFSET] = cos_path * (x[plant.Y] - path[i, 1]) - sin_path * (x[plant.X] - path[i, 0])
+    from_x = x[plant.X] - path[i, 0]
+    from_y = x[plant.Y] - path[i, 1]
+    memory[OFFSET] = cos_path * from_y - sin_path * from_x
+    memory[BEYOND] = max(cos_path * from_x + sin_path * from_y, 0.0) if i == last else 0.0
     memory[ASTRAY] = wrapped(x[plant.YAW] - path[i, 2])
 
 
@@ -190,8 +193,9 @@ def steer_along(x, u, p, driver, path, memory):  # type: ignore[no-untyped-def]
     v_x = max(x[plant.V_X], 1.0)
     speed = math.hypot(v_x, x[plant.V_Y])
     ahead = max(speed * driver.preview_time, 2.0) / SPACING
-    place = min(memory[INDEX] + ahead, path.shape[0] - 1.001)
-    j = int(place)
+    # Behind its end the path goes straight on.
+    place = memory[INDEX] + ahead + memory[BEYOND] / SPACING
+    j = min(int(place), path.shape[0] - 2)
     part = place - j
     target_x = path[j, 0] + part * (path[j + 1, 0] - path[j, 0]) - x[plant.X]
     target_y = path[j, 1] + part * (path[j + 1, 1] - path[j, 1]) - x[plant.Y]

@@ -186,7 +186,7 @@ def _end_of(run):  # type: ignore[no-untyped-def]
     on_path = run.path.shape[0] > 0
     speed = math.hypot(x[plant.V_X], x[plant.V_Y])
     if speed > _SPUN_SPEED:
-        if abs(math.atan2(x[plant.V_Y], x[plant.V_X])) > SPUN:
+        if math.atan2(abs(x[plant.V_Y]), abs(x[plant.V_X])) > SPUN:  # backwards is no spin
             return SPIN
         if on_path and abs(run.memory[ASTRAY]) > SPUN:
             return SPIN

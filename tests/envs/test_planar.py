@@ -4,6 +4,8 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from planar_cases import OPEN_LOOP, SCENARIOS, held, scenario_of, simulation_of, vehicle_with
 
 from gripbench.envs.planar import PlanarSimulation
@@ -123,6 +125,55 @@ def test_an_exploding_plant_ends_named_and_without_nan():
     assert np.isfinite(truth.view(np.float64)).all()
 
 
+def test_reversing_is_no_spin():
+    simulation = simulation_of(OPEN_LOOP, speed=0.0, stop_speed=0.0)
+    simulation.reset(0)
+    simulation._run.state[0] = -4.0
+    simulation._run.state[3:7] = -4.0 / 0.306
+    truth = held(simulation, [0.02, 0.0, 0.0, 0.0, 0.0], 500)
+    assert simulation.termination == ""
+    assert truth["speed_x"][-1] < -3.0
+
+
+def test_the_road_goes_straight_on_behind_the_end_of_the_path():
+    simulation = simulation_of(
+        "two_turns", path={"kind": "turns", "segments": [{"length": 20.0}]}, horizon=30.0
+    )
+    truth = simulation.run(1)
+    assert simulation.termination == ""
+    assert math.hypot(truth["position_x"][-1], truth["position_y"][-1]) > 850.0
+    assert np.abs(truth["sideslip"]).max() < 1e-9
+
+
+@settings(max_examples=40)
+@given(
+    speed=st.sampled_from([0.0, 0.3, 2.0, 15.0, 60.0]),
+    tyre=st.sampled_from(["brush", "dugoff", "magic_formula"]),
+    mu=st.sampled_from([0.02, 0.3, 1.2]),
+    vehicle=st.sampled_from(["dakhlallah2008", "yoon2015_pickup"]),
+    actions=st.lists(
+        st.tuples(st.floats(-1.2, 1.2), *[st.floats(-6000.0, 6000.0)] * 4), min_size=1, max_size=8
+    ),
+)
+def test_no_action_whatever_leads_to_nan(speed, tyre, mu, vehicle, actions):
+    simulation = simulation_of(
+        OPEN_LOOP | {"vehicle": vehicle, "tyre": tyre, "stop_speed": 0.0, "sample_time": 0.01},
+        speed=speed,
+        road={"mu": mu, "bank": 0.1, "grade": -0.1},
+    )
+    simulation.reset(0)
+    for action in actions:
+        for _ in range(20):
+            sample = simulation.advance(np.array(action))
+            assert np.isfinite(sample.view(np.float64)).all()
+            for wheel in ("front_left", "front_right", "rear_left", "rear_right"):
+                assert sample[f"mu_used_{wheel}"][0] <= mu * (1.0 + 1e-9)
+                assert sample[f"force_z_{wheel}"][0] >= 0.0
+            if simulation.termination:
+                assert simulation.termination in ("spin", "roll_over")
+                return
+
+
 # --- kinematics and instruments
 
 
@@ -218,7 +269,9 @@ def test_split_friction_is_seen_by_the_wheels_on_each_side():
     assert (truth["mu_rear_right"] == 0.25).all()
     braking = truth[(truth["time"] > 5.0) & (truth["speed_x"] > 5.0)]
     assert (braking["force_x_front_left"] < 1.5 * braking["force_x_front_right"]).all()
-    assert np.abs(truth["position_y"]).max() < np.inf
+    heading = truth["yaw"][0]
+    across = math.cos(heading) * truth["position_y"] - math.sin(heading) * truth["position_x"]
+    assert np.abs(across).max() < 1.0  # the driver holds the lane
 
 
 def test_friction_jumps_under_the_front_wheels_first_and_is_noted():
