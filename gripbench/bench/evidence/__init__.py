@@ -1,0 +1,1 @@
+"""Evidence for the errata of a paper and for the settings behind its reproduction."""
