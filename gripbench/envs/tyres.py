@@ -1,7 +1,7 @@
 """Longitudinal tyre: the Magic Formula and the slip ratio of Li, Du & Li (2014), eq. 4-5.
 
 Errata: Table III gives the slope of the linear region as 50000 N for one tyre, while the Magic
-Formula of the same table has the slope B C mu F_z, 102 kN for the front axle at mu = 0.9; the
+Formula of the same table has the slope B C mu F_z, 102 kN for a front tyre at mu = 0.9; the
 plant follows the Magic Formula.
 """
 
