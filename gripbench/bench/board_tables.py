@@ -19,7 +19,7 @@ Timings = Mapping[str, Mapping[str, RelativeRuntime]]
 
 
 def board_table(board: Board, timings: Timings | None = None, wide: bool = False) -> Table:
-    """Return a board as a table; bold is every method that may be the best one.
+    """Return a board as a table; marked is every method that may be the best one.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def board_table(board: Board, timings: Timings | None = None, wide: bool = False
     rows = [_row(line, timings or {}) for line in board.lines.to_dict("records")]
     notes = [
         f"{len(board.scenarios)} scenarios, {max(len(board.seeds), 1)} common seeds. Methods that "
-        "share a letter are not separable; bold may be the best.",
+        "share a letter are not separable; a marked score may be the best.",
         *board.notes,
     ]
     if board.lines["idealised"].any():

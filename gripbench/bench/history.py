@@ -317,6 +317,8 @@ def _lines(
     title: str,
 ) -> None:
     """Draw one line a method; a method looks the same in every panel."""
+    from matplotlib.ticker import LogFormatter
+
     for number, label in enumerate(labels):
         part = frame[(frame["label"] == label) & frame[column].notna()]
         axis.plot(
@@ -329,5 +331,7 @@ def _lines(
             linewidth=1,
         )
     axis.set_yscale("log")
+    axis.yaxis.set_major_formatter(LogFormatter())
+    axis.yaxis.set_minor_formatter(LogFormatter())
     axis.set_ylabel(title)
     axis.grid(alpha=0.3)

@@ -129,7 +129,7 @@ def write(folder: Path, leaderboard: Leaderboard, found: list[Board]) -> list[Pa
     texts = {
         "leaderboard.md": text_of(leaderboard, found),
         "leaderboard.csv": _csv(leaderboard, found),
-        "leaderboard.json": json.dumps(leaderboard.model_dump(), indent=1, allow_nan=False) + "\n",
+        "leaderboard.json": _json(leaderboard.model_dump()),
     }
     for name, text in texts.items():
         write_atomically(folder / name, text)
@@ -188,6 +188,18 @@ def text_of(leaderboard: Leaderboard, found: list[Board]) -> str:
 def _without_caption(board: Board, timings: Timings | None) -> str:
     text = markdown(board_table(board, timings, wide=True))
     return text.removeprefix(board.title).strip()
+
+
+def _json(content: dict[str, Any]) -> str:
+    """Return JSON with one line a board and a method's runs, so that versions can be compared."""
+    parts = []
+    for key, value in content.items():
+        if isinstance(value, list | tuple):
+            lines = ",\n  ".join(json.dumps(item, allow_nan=False) for item in value)
+            parts.append(f'"{key}": [\n  {lines}\n ]')
+        else:
+            parts.append(f'"{key}": {json.dumps(value, allow_nan=False)}')
+    return "{\n " + ",\n ".join(parts) + "\n}\n"
 
 
 def _csv(leaderboard: Leaderboard, found: list[Board]) -> str:
