@@ -170,7 +170,7 @@ def _file(name: str) -> str:
 
 def _plotly() -> str:
     try:
-        from plotly.offline import get_plotlyjs
+        from plotly.offline import get_plotlyjs  # type: ignore[import-untyped, unused-ignore]
     except ImportError:
         raise InputError("the report needs: pip install 'gripbench[report]'") from None
     script: str = get_plotlyjs()
