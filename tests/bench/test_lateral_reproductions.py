@@ -1,0 +1,34 @@
+"""The lateral papers run again on a few of their test seeds keep every verdict."""
+
+import numpy as np
+import pytest
+
+from gripbench.bench.claims import changed_verdicts, load_paper
+from gripbench.bench.reproductions import anderson2004, dakhlallah2008
+from gripbench.envs.worlds import load_scenario, record
+
+
+@pytest.mark.parametrize("module", [anderson2004, dakhlallah2008])
+def test_every_claim_keeps_its_verdict(module):
+    calls = []
+    claims = module.reproduce(lambda done, total: calls.append((done, total)), seeds=[0, 1, 2])
+    paper = load_paper(module.NAME)
+    assert [claim.item for claim in claims] == [claim.item for claim in paper.claims]
+    assert changed_verdicts(paper, claims) == []
+    assert calls[-1][0] == calls[-1][1]
+
+
+def test_the_gyroscopes_scale_changes_nothing_else():
+    scenario = load_scenario("two_turns").model_copy(update={"horizon": 20.0})
+    clean = record(scenario, 1).observations
+    scaled = record(anderson2004.with_gyro_scale(scenario), 1).observations
+    for name in clean.dtype.names:
+        assert np.array_equal(clean[name], scaled[name]) == (name != "yaw_rate")
+
+
+def test_identified_stiffness_is_the_vehicles_own_in_the_linear_range():
+    run = record(load_scenario("two_turns"), 1000)
+    identified = anderson2004.identify([run])
+    for axle in ("front", "rear"):
+        name = f"cornering_stiffness_{axle}"
+        assert identified[name] == pytest.approx(run.vehicle[name], rel=0.02)
