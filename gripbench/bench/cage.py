@@ -58,25 +58,23 @@ class Cage:
 
     Parameters
     ----------
-    source
-        The method.
     limits
         What a cell may take.
     """
 
-    def __init__(self, source: Source, limits: Limits) -> None:
-        self.source = source
+    def __init__(self, limits: Limits) -> None:
         self.limits = limits
         self._process: subprocess.Popen[bytes] | None = None
         self._connection: Connection | None = None
 
-    def declare(self, variant: str, parameters: dict[str, Any]) -> Declaration:
-        """Return what the method declares."""
-        answer: Declaration = self._ask("declare", variant, parameters)
+    def declare(self, source: Source, variant: str, parameters: dict[str, Any]) -> Declaration:
+        """Return what a method declares."""
+        answer: Declaration = self._ask("declare", source, variant, parameters)
         return answer
 
     def execute(
         self,
+        source: Source,
         declaration: Declaration,
         variant: str,
         parameters: dict[str, Any],
@@ -85,7 +83,7 @@ class Cage:
         period: float,
         seed: int,
     ) -> Outcome:
-        """Run the method over a recording.
+        """Run a method over a recording.
 
         Raises
         ------
@@ -93,7 +91,7 @@ class Cage:
             With status `failed`, `timeout` or `skipped` and the reason.
         """
         answer: Outcome = self._ask(
-            "execute", declaration, variant, parameters, vehicle, observations, period, seed
+            "execute", source, declaration, variant, parameters, vehicle, observations, period, seed
         )
         return answer
 
@@ -108,9 +106,9 @@ class Cage:
         self._process = self._connection = None
 
     def _ask(self, *request: Any) -> Any:
-        deadline = time.monotonic() + self.limits.time
         if self._process is None:
             self._start()
+        deadline = time.monotonic() + self.limits.time
         connection = self._connection
         assert connection is not None
         try:
@@ -154,7 +152,7 @@ class Cage:
         for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
             environment.setdefault(name, "1")
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "gripbench.bench.cage", str(theirs.fileno())],
+            [sys.executable, "-m", "gripbench.bench.cage", str(theirs.fileno()), str(os.getpid())],
             pass_fds=[theirs.fileno()],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
@@ -163,7 +161,15 @@ class Cage:
         )
         theirs.close()
         self._connection = ours
-        ours.send((self.source, self.limits.memory))
+        ours.send(self.limits.memory)
+        # Until it is ready it runs no code of a method: that time is nobody's.
+        with contextlib.suppress(EOFError, OSError):
+            if ours.poll(_START):
+                ours.recv()
+                return
+        reason = self._last_words()
+        self.close()
+        raise GripbenchError(f"a process for a method cannot be started: {reason}")
 
     def _last_words(self) -> str:
         """Return how the process ended."""
@@ -203,6 +209,12 @@ class _Alarm:
                 process.kill()
 
 
+_START = 120.0
+"""Time [s] in which an empty process has to start."""
+
+_declaring = Cage(Limits())
+
+
 def declare(source: Source, variant: str, parameters: dict[str, Any]) -> Declaration:
     """Return what a method declares, without running its code in this process.
 
@@ -211,29 +223,31 @@ def declare(source: Source, variant: str, parameters: dict[str, Any]) -> Declara
     InputError
         If it cannot be loaded, or declares what is not possible.
     """
-    cage = Cage(source, Limits())
     try:
-        return cage.declare(variant, parameters)
+        return _declaring.declare(source, variant, parameters)
     except CellFailure as error:
         text = str(error)
         place = source.target.rstrip(":")
         raise InputError(text if place.split(":")[0] in text else f"{place}: {text}") from None
-    finally:
-        cage.close()
 
 
-def _serve(descriptor: int) -> None:
+def end_declaring() -> None:
+    """End the process in which methods declare themselves; the next one gets a new process."""
+    _declaring.close()
+
+
+def _serve(descriptor: int, parent: int) -> None:
     """Answer requests until the parent goes away."""
     connection = Connection(descriptor)
-    _die_with_parent()
-    source, memory = connection.recv()
-    _limit_memory(memory)
+    _die_with(parent)
+    _limit_memory(connection.recv())
+    connection.send("ready")
     while True:
         try:
             request = connection.recv()
         except (EOFError, OSError):
             return
-        answer = _answer(source, request)
+        answer = _answer(request)
         try:
             connection.send(answer)
         except MemoryError:
@@ -242,12 +256,12 @@ def _serve(descriptor: int) -> None:
             connection.send(("failed", describe_error(error)))
 
 
-def _answer(source: Source, request: tuple[Any, ...]) -> tuple[str, Any]:
+def _answer(request: tuple[Any, ...]) -> tuple[str, Any]:
     try:
         if request[0] == "declare":
-            _, variant, parameters = request
+            _, source, variant, parameters = request
             return "ok", declaration_of(source.make(variant, parameters), variant, parameters)
-        _, declaration, variant, parameters, vehicle, observations, period, seed = request
+        _, source, declaration, variant, parameters, vehicle, observations, period, seed = request
         # A method may draw from the global generators: the same numbers in any order of cells.
         random.seed(seed)
         np.random.seed(seed % 2**32)  # noqa: NPY002
@@ -275,12 +289,14 @@ def _limit_memory(memory: int) -> None:
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
-def _die_with_parent() -> None:
+def _die_with(parent: int) -> None:
     """Ask Linux to kill this process with its parent, however that one ends."""
     if sys.platform == "linux":
         with contextlib.suppress(OSError, AttributeError):
             ctypes.CDLL(None).prctl(1, signals.SIGKILL)
+    if os.getppid() != parent:  # it ended before
+        os._exit(1)
 
 
 if __name__ == "__main__":
-    _serve(int(sys.argv[1]))
+    _serve(int(sys.argv[1]), int(sys.argv[2]))

@@ -101,6 +101,7 @@ def _outcome(task: Task, spec: MethodSpec, recording: Recording, period: float) 
             task.timed,
         )
     return _cage(spec.source, task.limits).execute(
+        spec.source,
         spec.declaration,
         spec.variant,
         spec.parameters,
@@ -147,7 +148,7 @@ def _cage(source: Source, limits: Limits) -> Cage:
     """Return this process's cage of a method; it lives as long as the process."""
     key = (source, limits)
     if key not in _cages:
-        _cages[key] = Cage(source, limits)
+        _cages[key] = Cage(limits)
     return _cages[key]
 
 

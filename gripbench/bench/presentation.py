@@ -63,8 +63,8 @@ def cell(line: pd.Series) -> str:
     return " ".join(parts)
 
 
-def rms_tables(summary: pd.DataFrame) -> list[Table]:
-    """Return one table a target: methods down, scenarios across."""
+def rms_tables(summary: pd.DataFrame) -> list[tuple[str, Table]]:
+    """Return a heading and a table for each target: methods down, scenarios across."""
     tables = []
     for key, part in summary.groupby("target", sort=False):
         target = str(key)
@@ -73,10 +73,8 @@ def rms_tables(summary: pd.DataFrame) -> list[Table]:
         scenarios = list(dict.fromkeys(part["scenario"]))
         unit = signal(target).unit
         runs = int(part["runs"].max())
-        table = Table(
-            title=f"{target} [{unit}]: RMS error over {runs} runs, with its 95 % interval",
-            title_justify="left",
-        )
+        heading = f"{target} [{unit}]: RMS error, pooled over {runs} runs, 95 % interval"
+        table = Table()
         table.add_column("method")
         for scenario in scenarios:
             table.add_column(scenario, justify="right")
@@ -84,14 +82,15 @@ def rms_tables(summary: pd.DataFrame) -> list[Table]:
             texts = {line["scenario"]: cell(line) for _, line in lines.iterrows()}
             name = marked(str(label), lines["idealised"].iloc[0])
             table.add_row(name, *(texts.get(scenario, "") for scenario in scenarios))
-        tables.append(table)
+        tables.append((heading, table))
     return tables
 
 
 def print_summary(summary: pd.DataFrame) -> None:
     """Print the tables of a summary, and what the mark means where it occurs."""
     out = console()
-    for table in rms_tables(summary):
+    for heading, table in rms_tables(summary):
+        out.print(heading, markup=False, soft_wrap=True)
         out.print(table)
     if (summary["idealised"] != "").any():
         out.print(FOOTNOTE)

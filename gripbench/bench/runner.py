@@ -15,7 +15,7 @@ from itertools import islice
 from typing import Any
 
 from gripbench.bench.backends import Backend, WorkerLostError
-from gripbench.bench.cage import Limits
+from gripbench.bench.cage import Limits, end_declaring
 from gripbench.bench.cells import Task, close_cages, run_tasks
 from gripbench.bench.fingerprints import scenario_digest, scoring_digest, versions
 from gripbench.bench.registry import MethodSpec
@@ -123,6 +123,7 @@ def run_plan(
                 waiting = list(_unfinished(waiting, plan, store, keys))
     finally:
         close_cages()
+        end_declaring()
     report.seconds = time.perf_counter() - began
     return report
 

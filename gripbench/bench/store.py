@@ -137,8 +137,9 @@ def read_row(path: Path) -> Row | None:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
     body = text[_START:-2]
     intact = (
-        text.startswith(_HEAD)
-        and text.endswith("}\n")
+        text[: len(_HEAD)] == _HEAD
+        and text[len(_HEAD) + _DIGEST : _START] == _MIDDLE
+        and text[-2:] == "}\n"
         and text[len(_HEAD) : len(_HEAD) + _DIGEST] == _digest(body)
     )
     if not intact:

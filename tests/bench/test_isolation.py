@@ -1,0 +1,160 @@
+"""Whatever a method does, it costs its own cells, leaves a row with the reason, and no more."""
+
+import os
+import subprocess
+import sys
+import time
+
+import pytest
+
+import gripbench
+from gripbench.bench.cage import Cage, CellFailure, Limits
+from gripbench.bench.registry import choose_method
+from gripbench.errors import InputError
+
+FAULTS = {
+    "Sound": ("ok", ""),
+    "Raises": ("failed", "ValueError: no luck (in fault, faulty.py:"),
+    "Hangs": ("timeout", "stopped after the time limit of 2 s"),
+    "Exits": ("failed", "its process exited with code 0"),
+    "Leaves": ("failed", "SystemExit: 3"),
+    "Crashes": ("failed", "its process was killed by SIGSEGV"),
+    "Hoards": ("failed", "out of memory (limit 600 MiB)"),
+    "NotANumber": ("diverged", "mu_front is nan from t = 0.099 s"),
+    "Infinite": ("diverged", "mu_front is too large to be squared"),
+    "Peeks": ("failed", "peeks reads the channel 'speed_gps', which is not among its sensors"),
+    "Misnames": ("failed", "the estimate 'mu_front' is declared but update does not return it"),
+    "Adds": ("failed", "update returns the estimate 'mu_rear', which is not among its estimates"),
+    "Nests": ("failed", "the estimate 'mu_front' is list; return a number"),
+    "Demands": ("skipped", "the vehicle does not give the parameter 'yaw_inertia_of_nothing'"),
+    "Blind": ("skipped", "the scenario has no sensor for 'yaw_rate'"),
+    "Floods": ("failed", "the estimate 'mu_front' is Floods; return a number"),
+}
+
+
+@pytest.fixture(scope="module")
+def faulty_rows(tmp_path_factory, plugins):
+    folder = tmp_path_factory.mktemp("faults")
+    scenario = gripbench.load_scenario("constant_mu").model_copy(update={"horizon": 1.0})
+    return gripbench.run(
+        scenarios=[scenario],
+        methods=["slip_slope", *(f"{plugins}/faulty.py:{name}" for name in FAULTS)],
+        results=folder,
+        workers=1,
+        time_limit=2.0,
+        memory_limit=600,
+    )
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_each_fault_costs_one_cell_and_says_why(faulty_rows, plugins, fault):
+    names = "".join(f"_{c.lower()}" if c.isupper() else c for c in fault).lstrip("_")
+    row = faulty_rows[faulty_rows["label"] == names].iloc[0]
+    status, reason = FAULTS[fault]
+    assert row["status"] == status
+    assert row["reason"].startswith(reason)
+    assert "\n" not in row["reason"]
+    assert row["target"] in ("mu_front", "")
+
+
+def test_the_others_run_on(faulty_rows):
+    assert (faulty_rows.loc[faulty_rows["label"] == "slip_slope", "status"] == "ok").all()
+    assert faulty_rows["label"].nunique() == len(FAULTS) + 1
+
+
+def test_a_cage_is_usable_again_after_its_process_died(plugins):
+    spec = choose_method(f"{plugins}/faulty.py:Exits")
+    recording = gripbench.record(
+        gripbench.load_scenario("constant_mu").model_copy(update={"horizon": 1.0}), 0
+    )
+    cage = Cage(Limits(time=20.0))
+    observations = recording.observations[["time", "accel_x"]]
+    try:
+        with pytest.raises(CellFailure, match="exited with code 0"):
+            cage.execute(
+                spec.source, spec.declaration, "", {}, recording.vehicle, observations, 1e-3, 0
+            )
+        short = cage.execute(
+            spec.source, spec.declaration, "", {}, recording.vehicle, observations[:50], 1e-3, 0
+        )
+        assert len(short.estimates) == 50
+    finally:
+        cage.close()
+
+
+def test_no_process_outlives_its_cage(plugins):
+    cage = Cage(Limits(time=1.0))
+    source = choose_method(f"{plugins}/faulty.py:Hangs").source
+    declaration = cage.declare(source, "", {})
+    recording = gripbench.record(
+        gripbench.load_scenario("constant_mu").model_copy(update={"horizon": 1.0}), 0
+    )
+    process = cage._process
+    with pytest.raises(CellFailure, match="time limit"):
+        cage.execute(
+            source, declaration, "", {}, recording.vehicle, recording.observations, 1e-3, 0
+        )
+    assert process is not None
+    assert process.poll() is not None
+
+
+@pytest.mark.parametrize(
+    ("source", "message"),
+    [
+        ("def broken(:", "cannot be imported: SyntaxError"),
+        ("import os; os._exit(7)", "its process exited with code 7"),
+        ("x = 1", "name the class"),
+        (
+            "class A:\n name='a'\n sensors=('accel',)\n estimates=('mu_front',)\n"
+            " def reset(self, v, d): pass\n def update(self, o): pass",
+            "unknown signal 'accel'",
+        ),
+    ],
+)
+def test_a_file_that_cannot_be_used_is_one_line(tmp_path, source, message):
+    path = tmp_path / "plugin.py"
+    path.write_text(source, encoding="utf-8")
+    with pytest.raises(InputError, match=message) as caught:
+        choose_method(str(path))
+    assert "plugin.py" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_killed_run_leaves_no_process_behind(tmp_path, plugins, short_scenario):
+    command = (
+        f"import gripbench; gripbench.run(scenarios=[{short_scenario!r}], workers=1, "
+        f"methods=['{plugins}/faulty.py:Hangs'], results='{tmp_path}/results')"
+    )
+    run = subprocess.Popen([sys.executable, "-c", command])
+    children = []
+    deadline = time.monotonic() + 90.0
+    # The first child only reads the declaration; the second one runs the cell.
+    seen: set[int] = set()
+    while time.monotonic() < deadline and len(seen) < 2:
+        children = _children(run.pid)
+        seen |= set(children)
+        time.sleep(0.02)
+    run.kill()
+    run.wait()
+    deadline = time.monotonic() + 5.0
+    while time.monotonic() < deadline and any(_alive(child) for child in seen):
+        time.sleep(0.05)
+    assert len(seen) == 2
+    assert not any(_alive(child) for child in seen)
+
+
+def _children(pid: int) -> list[int]:
+    try:
+        with open(f"/proc/{pid}/task/{pid}/children", encoding="ascii") as file:
+            return [int(child) for child in file.read().split()]
+    except OSError:
+        return []
+
+
+def _alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+        with open(f"/proc/{pid}/stat", encoding="ascii") as file:
+            return file.read().rsplit(")", 1)[1].split()[0] != "Z"
+    except OSError:
+        return False

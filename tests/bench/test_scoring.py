@@ -1,0 +1,130 @@
+"""Scores against their definitions in NumPy."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gripbench.bench.scoring import BAND, HOLD, DivergedError, EstimateError, score
+from gripbench.bench.summary import interval
+from gripbench.envs.recordings import Recording
+from gripbench.envs.signals import record_type
+
+
+def a_recording(truth, used=None, **changes):
+    records = np.zeros(len(truth), record_type(("time", "mu_front", "utilisation")))
+    records["time"] = 0.01 * np.arange(len(truth))
+    records["mu_front"] = truth
+    records["utilisation"] = 0.0 if used is None else used
+    content = {"scenario": "s", "seed": 0, "vehicle": {}, "observations": records}
+    return Recording(**{**content, "truth": records, **changes})
+
+
+def estimates_of(values, variance=None):
+    names = ("mu_front",) if variance is None else ("mu_front", "mu_front_variance")
+    records = np.zeros(len(values), record_type(names))
+    records["mu_front"] = values
+    if variance is not None:
+        records["mu_front_variance"] = variance
+    return records, names
+
+
+@given(st.integers(0, 10**6), st.integers(2, 400), st.floats(0.0, 1.0))
+def test_scores_are_those_of_numpy(seed, length, score_from):
+    generator = np.random.default_rng(seed)
+    truth = generator.normal(size=length)
+    used = generator.uniform(0.0, 1.2, length)
+    values, names = estimates_of(generator.normal(size=length), np.full(length, 0.25))
+    recording = a_recording(truth, used, score_from=min(score_from, 0.01 * (length - 1)))
+    found = score(values, names, ("mu_front",), recording)["mu_front"]
+    kept = recording.truth["time"] >= recording.score_from
+    error = (values["mu_front"] - truth)[kept]
+    assert found.count == kept.sum()
+    assert found.rms == pytest.approx(np.sqrt(np.mean(error**2)), rel=1e-12)
+    assert found.peak == np.abs(error).max()
+    assert found.bias == pytest.approx(error.mean(), abs=1e-12)
+    assert found.mean_nees == pytest.approx(np.mean(error**2) / 0.25, rel=1e-12)
+    high = (used[kept] >= 0.5) & (used[kept] < 0.8)
+    if high.any():
+        assert found.by_utilisation["high"].count == high.sum()
+        assert found.by_utilisation["high"].sum_of_squares == pytest.approx(
+            (error[high] ** 2).sum()
+        )
+    assert sum(band.count for band in found.by_utilisation.values()) == found.count
+
+
+def test_convergence_is_the_start_of_the_first_long_stay_in_the_band():
+    times = 0.01 * np.arange(500)
+    error = np.where(times < 2.0, 1.0, 0.5 * BAND)
+    error[100 : 100 + int(HOLD / 0.01) - 5] = 0.0  # a stay that is too short
+    found = score(*estimates_of(1.0 + error), ("mu_front",), a_recording(np.ones(500)))
+    assert found["mu_front"].convergence_time == pytest.approx(2.0)
+
+
+def test_convergence_counts_from_the_friction_step():
+    times = 0.01 * np.arange(800)
+    error = np.where((times >= 3.0) & (times < 4.25), 1.0, 0.0)
+    recording = a_recording(np.ones(800), notes={"friction_step": 3.0})
+    found = score(*estimates_of(1.0 + error), ("mu_front",), recording)
+    assert found["mu_front"].convergence_time == pytest.approx(1.25)
+
+
+def test_what_never_converges_has_no_convergence_time():
+    found = score(*estimates_of(np.full(300, 2.0)), ("mu_front",), a_recording(np.ones(300)))
+    assert found["mu_front"].convergence_time is None
+
+
+def test_samples_without_truth_do_not_count():
+    truth = np.ones(100)
+    truth[40:] = np.nan
+    found = score(*estimates_of(np.full(100, 1.5)), ("mu_front",), a_recording(truth))
+    assert found["mu_front"].count == 40
+    assert found["mu_front"].rms == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_an_estimate_that_is_not_finite_diverges_even_where_it_does_not_count(value):
+    values, names = estimates_of(np.ones(100))
+    values["mu_front"][3] = value
+    with pytest.raises(DivergedError, match=r"mu_front is -?(nan|inf) from t = 0.03 s"):
+        score(values, names, ("mu_front",), a_recording(np.ones(100), score_from=0.5))
+
+
+def test_a_variance_that_is_not_positive_gives_no_consistency():
+    values, names = estimates_of(np.ones(100), np.linspace(-1.0, 1.0, 100))
+    found = score(values, names, ("mu_front",), a_recording(np.zeros(100)))
+    assert found["mu_front"].mean_nees is None
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        (np.zeros(100), "not a structured array"),
+        (np.zeros(99, record_type(("mu_front",))), "have shape"),
+        (np.zeros(100, record_type(("mu_rear",))), "'mu_front' is declared but not given"),
+        (np.zeros(100, record_type(("mu_front", "mu_rear"))), "'mu_rear' is given but not"),
+        (np.zeros(100, [("mu_front", np.float32)]), "not of type float64"),
+    ],
+)
+def test_estimates_of_another_form_are_refused(values, message):
+    with pytest.raises(EstimateError, match=message):
+        score(values, ("mu_front",), ("mu_front",), a_recording(np.ones(100)))
+
+
+def test_the_interval_agrees_with_the_bootstrap_of_scipy():
+    from scipy import stats
+
+    generator = np.random.default_rng(3)
+    counts = generator.integers(100, 300, 60).astype(float)
+    squares = counts * generator.gamma(2.0, 1.0, 60)
+    low, high = interval(squares, counts)
+    reference = stats.bootstrap(
+        (squares, counts),
+        lambda s, n, axis: np.sqrt(s.sum(axis=axis) / n.sum(axis=axis)),
+        paired=True,
+        method="percentile",
+        n_resamples=5000,
+        rng=np.random.default_rng(1),
+    ).confidence_interval
+    assert low == pytest.approx(reference.low, rel=0.02)
+    assert high == pytest.approx(reference.high, rel=0.02)

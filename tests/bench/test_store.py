@@ -1,0 +1,145 @@
+"""Rows are written whole or not at all, damage is noticed, and old rows keep loading."""
+
+import errno
+import json
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from gripbench.bench import rows, store
+from gripbench.bench.rows import Row, Stratum, TargetScore, pooled_rms, row_from
+from gripbench.bench.store import DamagedRowError, Store, leftovers, read_row, read_rows, seal
+from gripbench.errors import InputError
+
+SAMPLES = Path(__file__).parent / "stored_rows"
+
+
+def a_row(seed=0, **changes):
+    score = TargetScore(
+        rms=0.1,
+        sum_of_squares=1.0 / 3.0,
+        count=33,
+        peak=0.3,
+        bias=-0.01,
+        by_utilisation={"low": Stratum(sum_of_squares=1.0 / 3.0, count=33)},
+    )
+    content = {
+        "key": "k",
+        "scenario": "short",
+        "seed": seed,
+        "method": "rls",
+        "label": "rls:paper@a=1.0",
+        "targets": ("mu_front",),
+        "status": "ok",
+        "scores": {"mu_front": score},
+    }
+    return Row(**{**content, **changes})
+
+
+def test_a_row_comes_back_as_it_was(tmp_path):
+    place = Store(tmp_path)
+    place.write(a_row(7))
+    assert place.read("short", "rls:paper@a=1.0", 7) == a_row(7)
+    assert place.read("short", "rls:paper@a=1.0", 8) is None
+    assert list(place.read_all()) == [a_row(7)]
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_any_truncation_or_changed_byte_is_noticed(tmp_path, data):
+    path = tmp_path / "row.json"
+    content = seal(a_row()).encode()
+    at = data.draw(st.integers(0, len(content) - 1))
+    if data.draw(st.booleans()):
+        damaged = content[:at]
+    else:
+        damaged = content[:at] + bytes([content[at] ^ 0x15]) + content[at + 1 :]
+    path.write_bytes(damaged)
+    with pytest.raises(DamagedRowError):
+        read_row(path)
+
+
+def test_rows_of_the_first_schema_version_load():
+    row = read_row(SAMPLES / "version_1.json")
+    assert row is not None
+    assert row.status == "ok"
+    assert row.label == "slip_slope:paper"
+    assert row.scores["mu_front"].rms == 0.0406759484869095
+    failed = read_row(SAMPLES / "version_1_failed.json")
+    assert failed is not None
+    assert (failed.status, failed.targets) == ("timeout", ("mu_front",))
+
+
+def test_an_earlier_version_passes_through_every_step_to_the_present_one(monkeypatch):
+    monkeypatch.setattr(rows, "SCHEMA_VERSION", 3)
+    monkeypatch.setattr(
+        rows,
+        "_MIGRATIONS",
+        {
+            1: lambda content: {**content, "label": content["label"] + " two"},
+            2: lambda content: {**content, "label": content["label"] + " three"},
+        },
+    )
+    content = json.loads(a_row().model_dump_json())
+    assert row_from(content, "here").label == "rls:paper@a=1.0 two three"
+
+
+@pytest.mark.parametrize(
+    ("version", "message"), [(99, "newer gripbench"), ("x", "not a row"), (0, "not a row")]
+)
+def test_a_version_that_cannot_be_read_is_said_so(version, message):
+    content = {**json.loads(a_row().model_dump_json()), "schema_version": version}
+    with pytest.raises(InputError, match=message):
+        row_from(content, "here")
+
+
+@pytest.mark.parametrize(
+    ("code", "message"),
+    [
+        (errno.ENOSPC, "the disk is full"),
+        (errno.EROFS, "read-only"),
+        (errno.EACCES, "read-only"),
+        (errno.EIO, "input/output error"),
+    ],
+)
+def test_what_cannot_be_written_is_one_error_and_the_old_row_stays(
+    tmp_path, monkeypatch, code, message
+):
+    place = Store(tmp_path)
+    place.write(a_row())
+
+    def fail(path, text):
+        path.write_text(text[:40])
+        raise OSError(code, __import__("os").strerror(code))
+
+    monkeypatch.setattr(store, "_write", fail)
+    with pytest.raises(InputError, match=message):
+        place.write(a_row(reason="new"))
+    assert list(place.read_all()) == [a_row()]
+    assert leftovers(tmp_path) == []
+
+
+def test_a_results_folder_that_is_a_file_is_one_error(tmp_path):
+    (tmp_path / "results").write_text("")
+    with pytest.raises(InputError, match="cannot be written"):
+        Store(tmp_path / "results").write(a_row())
+
+
+def test_a_failed_row_has_a_line_for_each_of_its_targets(tmp_path):
+    place = Store(tmp_path)
+    place.write(a_row())
+    place.write(
+        a_row(1, status="timeout", reason="slow", scores={}, targets=("mu_front", "mu_rear"))
+    )
+    frame = read_rows(tmp_path)
+    assert list(frame["target"]) == ["mu_front", "mu_front", "mu_rear"]
+    assert list(frame["status"]) == ["ok", "timeout", "timeout"]
+    assert list(frame["rms"].isna()) == [False, True, True]
+    assert list(frame["count"]) == [33, 0, 0]
+
+
+def test_rms_is_pooled_by_squares_not_by_its_mean():
+    assert pooled_rms([1.0 * 10, 9.0 * 30], [10, 30]) == pytest.approx((280 / 40) ** 0.5)
+    assert pooled_rms([1.0 * 10, 9.0 * 30], [10, 30]) != pytest.approx((1.0 + 3.0) / 2)
