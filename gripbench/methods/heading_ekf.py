@@ -16,7 +16,8 @@ Errata corrected by default (`printed_4`, `printed_6` and `printed_7` restore th
 Two additions carry the filter over real roads. Where the field is steep a pitch of 1 degree looks
 like several degrees of heading, so an unknown pitch enters the measurement covariance as a
 considered parameter. And with one direction vector yaw and roll are not both observable on
-northerly and southerly headings: roll is therefore an Ornstein-Uhlenbeck process around zero.
+northerly and southerly headings: roll is therefore an Ornstein-Uhlenbeck process around the roll
+of the body on its springs, which the lateral acceleration gives (`no_roll_model`: around zero).
 The variant `pitch_aware` takes the road's pitch from the vertical velocity of the GPS, with the
 pitch gyroscope between its samples, and a weak roll from the lateral accelerometer.
 """
@@ -77,6 +78,8 @@ HEADING_SENSORS = (
     "gps_time",
 )
 
+HEADING_VEHICLE = ("roll_gradient",)
+
 HEADING_PARAMETERS = (
     Parameter("field_horizontal", 15.8e-6, "T", "Earth's field towards magnetic north", 1e-7, 1e-4),
     Parameter("field_up", -53.2e-6, "T", "Earth's field upwards", -1e-4, 1e-4),
@@ -85,8 +88,9 @@ HEADING_PARAMETERS = (
     Parameter("pitch_std", 30.0 * _DEGREE, "rad", "Unknown pitch, considered", 0.0, 10.0),
     Parameter("gate", 11.34, "-", "Largest Mahalanobis distance squared, 3 axes, 1 %", 0.0),
     Parameter("yaw_walk", 0.03 * _DEGREE, "rad/sqrt(s)", "Random walk of the yaw", 0.0, 1.0),
-    Parameter("roll_time", 2.0, "s", "Correlation time of the roll", 1e-3),
-    Parameter("roll_std", 1.5 * _DEGREE, "rad", "Standard deviation of the roll", 0.0, 1.0),
+    Parameter("roll_time", 5.0, "s", "Correlation time of that roll", 1e-3),
+    Parameter("roll_std", 1.0 * _DEGREE, "rad", "Roll that the springs do not explain", 0.0, 1.0),
+    Parameter("roll_model", 1.0, "-", "1: the roll returns to that of the springs", 0.0, 1.0),
     Parameter("roll_walk", 0.0, "rad/sqrt(s)", "Random walk of the roll", 0.0, 1.0),
     Parameter("alignment_time", 0.5, "s", "Time over which the first heading is averaged", 0.0),
     Parameter("alignment_pitch_std", 1.0 * _DEGREE, "rad", "Pitch while aligning", 0.0, 1.0),
@@ -105,7 +109,7 @@ HEADING_PARAMETERS = (
 PITCH_AWARE = {
     "pitch_from_gps": 1.0,
     "pitch_std": 5.0 * _DEGREE,
-    "roll_std": 1.0 * _DEGREE,
+    "roll_std": 0.7 * _DEGREE,
     "accelerometer_roll_std": 4.0 * _DEGREE,
 }
 """Settings for roads with grades and banks."""
@@ -120,6 +124,9 @@ TABLE_1_NOISE = {
 
 PRINTED_HEADING = TABLE_1_NOISE | {"printed_4": 1.0, "printed_6": 1.0, "printed_7": 1.0}
 """The same with the equations as printed."""
+
+NO_ROLL_MODEL = {"roll_model": 0.0, "roll_time": 2.0, "roll_std": 1.5 * _DEGREE}
+"""Roll around zero, without the springs."""
 
 UNGATED = 1e300
 """A gate that lets every finite measurement pass."""
@@ -152,8 +159,22 @@ def field_in_vehicle(yaw, roll, pitch, horizontal, up, printed):  # type: ignore
 
 
 @compiled
-def heading_predict(heading, yaw_rate, roll_rate, elapsed, params):  # type: ignore[no-untyped-def]
-    """Advance yaw and roll by eq. 7 with the gyroscopes' rates [rad/s] over `elapsed` [s]."""
+def heading_predict(heading, yaw_rate, roll_rate, accel_y, elapsed, params):  # type: ignore[no-untyped-def]
+    """Advance yaw and roll by eq. 7 over `elapsed` [s].
+
+    Parameters
+    ----------
+    heading
+        Record of `HEADING_STATE`.
+    yaw_rate, roll_rate
+        Rates of the gyroscopes [rad/s].
+    accel_y
+        Lateral acceleration [m/s^2], for the roll on the springs.
+    elapsed
+        Time [s].
+    params
+        Record with `HEADING_PARAMETERS` and `HEADING_VEHICLE`.
+    """
     f = heading.filter
     decay = np.exp(-elapsed / params.roll_time)
     roll = f.x[1]
@@ -161,7 +182,8 @@ def heading_predict(heading, yaw_rate, roll_rate, elapsed, params):  # type: ign
     yaw_speed = yaw_rate if printed else yaw_rate / np.cos(roll)
     roll_speed = roll_rate if printed else roll_rate + yaw_speed * np.sin(heading.pitch)
     f.x[0] += yaw_speed * elapsed
-    f.x[1] = decay * roll + roll_speed * elapsed
+    sprung = params.roll_model * params.roll_gradient * accel_y
+    f.x[1] = sprung + decay * (roll - sprung) + roll_speed * elapsed
     f.F[0, 0] = 1.0
     f.F[0, 1] = 0.0 if printed else elapsed * yaw_speed * np.tan(roll)
     f.F[1, 0] = 0.0
@@ -294,7 +316,7 @@ def heading_step(heading, obs, params):  # type: ignore[no-untyped-def]
                 heading.aligned = 1
         return
     if elapsed > 0.0:
-        heading_predict(heading, obs.yaw_rate, obs.roll_rate, elapsed, params)
+        heading_predict(heading, obs.yaw_rate, obs.roll_rate, obs.accel_y, elapsed, params)
         if params.accelerometer_roll_std > 0.0:
             level = np.hypot(obs.velocity_north, obs.velocity_west)
             leaning = (obs.accel_y - level * obs.yaw_rate) / GRAVITY
@@ -331,11 +353,13 @@ class HeadingEkf(CompiledMethod):
     sensors = HEADING_SENSORS
     estimates = ("yaw", "roll")
     variances = ("yaw", "roll")
+    vehicle_parameters = HEADING_VEHICLE
     parameters = HEADING_PARAMETERS
     variants = {  # noqa: RUF012
         "paper": PRINTED_HEADING,
         "table_1_noise": TABLE_1_NOISE,
         "pitch_aware": PITCH_AWARE,
+        "no_roll_model": NO_ROLL_MODEL,
         "no_rejection": {"gate": UNGATED},
     }
     state = np.dtype([("heading", HEADING_STATE)])

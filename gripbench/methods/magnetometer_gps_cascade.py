@@ -28,6 +28,8 @@ from gripbench.methods.heading_ekf import (
     HEADING_PARAMETERS,
     HEADING_SENSORS,
     HEADING_STATE,
+    HEADING_VEHICLE,
+    NO_ROLL_MODEL,
     PITCH_AWARE,
     PRINTED_HEADING,
     TABLE_1_NOISE,
@@ -89,12 +91,13 @@ class MagnetometerGpsCascade(CompiledMethod):
     sensors = (*HEADING_SENSORS, "accel_x", "steer_angle")
     estimates = ("sideslip", "mu", "yaw", "roll", "speed_x", "speed_y")
     variances = ("sideslip", "mu", "yaw", "roll", "speed_x", "speed_y")
-    vehicle_parameters = FRICTION_VEHICLE
+    vehicle_parameters = (*HEADING_VEHICLE, *FRICTION_VEHICLE)
     parameters = (*HEADING_PARAMETERS, *SIDESLIP_PARAMETERS, *FRICTION_PARAMETERS)
     variants = {  # noqa: RUF012
         "paper": PRINTED_HEADING | {"printed_15": 1.0, "printed_16": 1.0},
         "table_1_noise": TABLE_1_NOISE,
         "pitch_aware": PITCH_AWARE,
+        "no_roll_model": NO_ROLL_MODEL,
         "no_rejection": {"gate": UNGATED},
         "no_delay_handling": {"delay_handling": IGNORE_DELAY},
         "single_delay": {"delay_handling": LARSEN},

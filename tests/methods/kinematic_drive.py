@@ -8,6 +8,7 @@ from gripbench.methods.magnetometer_gps_cascade import MagnetometerGpsCascade
 
 FIELD = (15.8e-6, -53.2e-6)
 VEHICLE = {
+    "roll_gradient": 0.0,  # the roll of this drive is not that of springs
     "mass": 2450.0,
     "cg_to_front": 1.573,
     "cg_to_rear": 2.085,
