@@ -103,8 +103,14 @@ def chosen_instruments(given: str | Iterable[str]) -> tuple[str, ...]:
     return tuple(chosen)
 
 
-def grid_of(rows: pd.DataFrame, target: str, allowed: tuple[str, ...] | None = None) -> Grid:
-    """Return the common runs of the methods of a board.
+def on_board(
+    rows: pd.DataFrame, target: str, allowed: tuple[str, ...] | None = None
+) -> list[pd.DataFrame]:
+    """Return the rows of the methods of a board, in parts that can be compared.
+
+    Methods that share no scenario, not even by way of others, come in different parts: those of
+    a longitudinal and of a lateral suite that estimate the same signal, say. Being skipped in a
+    scenario does not count as sharing it.
 
     Parameters
     ----------
@@ -118,7 +124,7 @@ def grid_of(rows: pd.DataFrame, target: str, allowed: tuple[str, ...] | None = N
     Raises
     ------
     InputError
-        If a run occurs twice, or the methods have no seed in common.
+        If no method estimates the target with these instruments, or every run was skipped.
     """
     lines = rows[rows["target"] == target]
     if allowed is not None:
@@ -126,6 +132,44 @@ def grid_of(rows: pd.DataFrame, target: str, allowed: tuple[str, ...] | None = N
         lines = lines[lines["sensors"].map(fits).astype(bool)]
     if lines.empty:
         raise InputError(f"{target}: no method estimates it with these instruments")
+    ran = lines[lines["status"] != "skipped"]
+    if ran.empty:
+        raise InputError(f"{target}: every run was skipped")
+    homes = ran.groupby("label")["scenario"].agg(set)
+    parts = []
+    for scenarios in _connected(homes):
+        part = lines[lines["scenario"].isin(scenarios)]
+        # what is at home in another part is a stranger here
+        elsewhere = {label for label, home in homes.items() if not home & scenarios}
+        parts.append(part[~part["label"].isin(elsewhere)])
+    return parts
+
+
+def _connected(groups: Iterable[set[str]]) -> list[set[str]]:
+    """Return the unions of the groups that overlap, directly or by way of others."""
+    unions: list[set[str]] = []
+    for group in groups:
+        apart = [union for union in unions if not union & group]
+        joined = set(group).union(*(union for union in unions if union & group))
+        unions = [*apart, joined]
+    return sorted(unions, key=min)
+
+
+def grid_of(lines: pd.DataFrame, target: str) -> Grid:
+    """Return the common runs of the methods of a board.
+
+    Parameters
+    ----------
+    lines
+        Rows of a board, one of the parts that `on_board` returns.
+    target
+        Signal that is estimated.
+
+    Raises
+    ------
+    InputError
+        If a run occurs twice, or the methods have no seed in common.
+    """
     twice = lines.duplicated(["scenario", "label", "seed"])
     if twice.any():
         first = lines[twice].iloc[0]
@@ -133,11 +177,6 @@ def grid_of(rows: pd.DataFrame, target: str, allowed: tuple[str, ...] | None = N
             f"{target}: '{first['label']}' has two rows for seed {first['seed']} of "
             f"'{first['scenario']}'"
         )
-    # where nobody could run there is nothing to compare
-    ran = lines.groupby("scenario")["status"].transform(lambda s: (s != "skipped").any())
-    lines = lines[ran.astype(bool)]
-    if lines.empty:
-        raise InputError(f"{target}: every run was skipped")
     common, notes = _common_seeds(lines, target)
     repeated = sorted(name for name, seeds in common.items() if len(seeds) > 1)
     seeds = _over_scenarios({name: common[name] for name in repeated}, target)

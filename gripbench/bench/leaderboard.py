@@ -103,7 +103,7 @@ def build(
     """
     found = boards(rows, confidence=confidence)
     for target in dict.fromkeys(board.target for board in found):
-        if sum(board.target == target for board in found) > 1:
+        if len({board.sensors for board in found if board.target == target}) > 1:
             found += boards(rows, target, ANY, confidence=confidence)
     found.sort(key=lambda board: board.target)
     return (

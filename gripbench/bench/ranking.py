@@ -20,7 +20,15 @@ import numpy.typing as npt
 import pandas as pd
 
 from gripbench.bench import statistics
-from gripbench.bench.grids import ANY, Grid, chosen_instruments, grid_of, instruments, sensor_sets
+from gripbench.bench.grids import (
+    ANY,
+    Grid,
+    chosen_instruments,
+    grid_of,
+    instruments,
+    on_board,
+    sensor_sets,
+)
 from gripbench.bench.pareto import pareto_front
 from gripbench.bench.rows import UTILISATION_BANDS, pooled_rms
 from gripbench.errors import InputError, unknown
@@ -47,7 +55,7 @@ class Board:
     sensors
         Instruments that a method on this board may read; empty with `ANY`.
     title
-        Target and instruments in words.
+        Target and instruments in words, and the scenarios where another board has the same.
     confidence
         Confidence of all its claims together, and of each interval.
     scenarios
@@ -161,7 +169,9 @@ def boards(
     for name in [name for name in targets if name] or sorted(known):
         ran = rows[(rows["target"] == name) & (rows["status"] != "skipped")]
         for allowed in sensor_sets(ran) if given == () else [given]:
-            found.append(_board(rows, name, allowed, settings))
+            parts = on_board(rows, name, allowed)
+            for lines in parts:
+                found.append(_board(lines, name, allowed, len(parts) > 1, settings))
     if not found:
         raise InputError("nothing to rank: every run was skipped")
     return found
@@ -185,9 +195,15 @@ def _only(rows: pd.DataFrame, column: str, chosen: Iterable[str]) -> pd.DataFram
 
 
 def _board(
-    rows: pd.DataFrame, target: str, allowed: tuple[str, ...] | None, settings: _Settings
+    rows: pd.DataFrame,
+    target: str,
+    allowed: tuple[str, ...] | None,
+    one_of_several: bool,
+    settings: _Settings,
 ) -> Board:
-    grid = grid_of(rows, target, allowed)
+    grid = grid_of(rows, target)
+    scenarios = tuple(sorted((*grid.scenarios, *grid.single)))
+    title = f"{target} with {'any sensors' if allowed is None else ', '.join(allowed)}"
     ranks, p_better = _ranks(grid, settings)
     lines = pd.DataFrame(
         [
@@ -212,9 +228,9 @@ def _board(
     return Board(
         target=target,
         sensors=allowed or (),
-        title=f"{target} with {'any sensors' if allowed is None else ', '.join(allowed)}",
+        title=title + (f" in {', '.join(scenarios)}" if one_of_several else ""),
         confidence=settings.confidence,
-        scenarios=tuple(sorted((*grid.scenarios, *grid.single))),
+        scenarios=scenarios,
         seeds=grid.seeds,
         lines=lines,
         p_better=p_better.reindex(index=complete, columns=complete),

@@ -188,6 +188,21 @@ def test_method_that_nowhere_finds_its_sensors_gets_no_board_of_its_own():
     assert [board.sensors for board in boards(frame_of(rows))] == [instruments(TORQUE)]
 
 
+def test_methods_without_a_common_scenario_stand_on_different_boards():
+    rows = noisy_rows({"a": 2.0, "b": 1.0}, seeds=4, scenarios=("step", "hill"))
+    rows += noisy_rows({"c": 2.0, "d": 1.0}, seeds=4, scenarios=("bend",))
+    # tried there, but it found no sensors: no failure, it is at home elsewhere
+    rows += [row("c", seed, None, "step", status="skipped") for seed in range(4)]
+    found = {board.title.partition(" in ")[2]: list(board.lines["label"])
+             for board in boards(frame_of(rows))}  # fmt: skip
+    assert found == {"bend": ["d", "c"], "hill, step": ["b", "a"]}
+    # one method that ran in both makes them one board, on which the others are incomplete
+    rows += noisy_rows({"e": 9.0}, seeds=4, scenarios=("step", "hill", "bend"))
+    (board,) = boards(frame_of(rows))
+    assert list(board.lines["label"]) == ["e", "a", "b", "c", "d"]
+    assert list(board.lines["failures"]) == [0, 4, 4, 8, 8]
+
+
 def test_pareto_front_of_score_and_runtime():
     slow, fast = Runtime(batch=1e-3), Runtime(batch=1e-7)
     found = rank(noisy_frame({"a": 1.0, "b": 2.0, "c": 3.0}, a={"runtime": slow},
