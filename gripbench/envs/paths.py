@@ -16,6 +16,7 @@ from pydantic import Field, model_validator
 from gripbench.configuration import Configuration
 from gripbench.envs.road import SPACING, stream
 
+_FINE = 0.05  # spacing at which curvature is integrated to a path [m]
 _MARGIN = 200.0  # straight on behind the end, for the driver's preview
 
 
@@ -184,12 +185,12 @@ def _of_segments(segments: list[Segment]) -> npt.NDArray[np.float64]:
             knots.append((station + ramp + max(arc, 0.01), curvature))
             knots.append((station + 2.0 * ramp + max(arc, 0.01), 0.0))
     knots.append((knots[-1][0] + _MARGIN, 0.0))
-    at = np.arange(0.0, knots[-1][0], 0.01)
+    at = np.arange(0.0, knots[-1][0], _FINE)
     stations, curvatures = np.array(knots).T
     curvature = np.interp(at, stations, curvatures)
-    heading = np.concatenate([[0.0], np.cumsum(0.5 * (curvature[1:] + curvature[:-1]) * 0.01)])
+    heading = np.concatenate([[0.0], np.cumsum(0.5 * (curvature[1:] + curvature[:-1]) * _FINE)])
     middle = 0.5 * (heading[1:] + heading[:-1])
-    x = np.concatenate([[0.0], np.cumsum(np.cos(middle) * 0.01)])
-    y = np.concatenate([[0.0], np.cumsum(np.sin(middle) * 0.01)])
-    every = round(SPACING / 0.01)
+    x = np.concatenate([[0.0], np.cumsum(np.cos(middle) * _FINE)])
+    y = np.concatenate([[0.0], np.cumsum(np.sin(middle) * _FINE)])
+    every = round(SPACING / _FINE)
     return np.column_stack([x, y, heading, curvature])[::every].copy()
