@@ -27,6 +27,7 @@ import rich.table
 import rich.text
 from rich.console import Console
 
+from gripbench.bench.latex import latex_line, latex_number, latex_text
 from gripbench.errors import InputError, nearest, unknown
 
 MISSING = "–"
@@ -267,9 +268,9 @@ def latex(table: Table, standalone: bool = False) -> str:
     alignment = "".join("r" if _is_numeric(table, column) else "l" for column in table.columns)
     lines = [r"\begin{table}[htbp]", r"\centering"]
     if table.caption:
-        lines.append(rf"\caption{{{_latex(table.caption)}}}")
+        lines.append(rf"\caption{{{latex_text(table.caption)}}}")
     lines += [rf"\begin{{tabular}}{{@{{}}{alignment}@{{}}}}", r"\toprule"]
-    lines.append(_latex_line([_latex(column.heading) for column in table.columns]))
+    lines.append(latex_line([latex_text(column.heading) for column in table.columns]))
     lines.append(r"\midrule")
     for number, group in enumerate(table.groups):
         if number:
@@ -279,14 +280,14 @@ def latex(table: Table, standalone: bool = False) -> str:
             for column in table.columns:
                 text = table.text(row, column)
                 number_shown = _is_number(table.rows[row][column.key])
-                text = _latex_number(text) if number_shown else _latex(text)
+                text = latex_number(text) if number_shown else latex_text(text)
                 if (row, column.key) in best:
                     text = rf"\textbf{{\boldmath {text}}}"
                 cells.append(text)
-            lines.append(_latex_line(cells))
+            lines.append(latex_line(cells))
     lines += [r"\bottomrule", r"\end{tabular}"]
     if table.notes:
-        lines.append(r"\par\smallskip\footnotesize " + " ".join(map(_latex, table.notes)))
+        lines.append(r"\par\smallskip\footnotesize " + " ".join(map(latex_text, table.notes)))
     lines.append(r"\end{table}")
     body = "\n".join(lines) + "\n"
     if not standalone:
@@ -420,40 +421,6 @@ def _csv(value: Any) -> str:
 def _markdown(text: str) -> str:
     text = re.sub(r"([\\`*|<]|(?<!\w)_|_(?!\w))", r"\\\1", text)  # mu_front reads as it is
     return text.replace("\n", " ")
-
-
-_LATEX = {
-    "\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_",
-    "{": r"\{", "}": r"\}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}",
-    "<": r"$<$", ">": r"$>$", "|": r"$|$", '"': "''", "\n": " ",
-    "–": "--", "—": "---", "−": "$-$", "±": r"$\pm$", "×": r"$\times$", "·": r"$\cdot$",
-    "≤": r"$\le$", "≥": r"$\ge$", "≠": r"$\ne$", "≈": r"$\approx$", "²": "$^2$", "°": r"$^\circ$",
-    "∞": r"$\infty$", "→": r"$\to$", "√": r"$\surd$", "µ": r"$\mu$", "α": r"$\alpha$",
-    "β": r"$\beta$", "γ": r"$\gamma$", "δ": r"$\delta$", "κ": r"$\kappa$", "λ": r"$\lambda$",
-    "μ": r"$\mu$", "σ": r"$\sigma$", "τ": r"$\tau$", "φ": r"$\phi$", "ψ": r"$\psi$",
-    "ω": r"$\omega$", "θ": r"$\theta$", "Δ": r"$\Delta$", "…": r"\ldots{}",
-}  # fmt: skip
-
-
-def _latex_line(cells: Sequence[str]) -> str:
-    # a line that starts with a bracket or star would be read as an option of the end of the last
-    protection = "{}" if cells[0].startswith(("[", "*")) else ""
-    return protection + " & ".join(cells) + r" \\"
-
-
-def _latex(text: str) -> str:
-    pieces = re.split(r"\^(-?\d+)", text)  # powers in units, such as m/s^2
-    return "".join(
-        f"$^{{{piece}}}$" if index % 2 else "".join(_LATEX.get(letter, letter) for letter in piece)
-        for index, piece in enumerate(pieces)
-    )
-
-
-def _latex_number(text: str) -> str:
-    match = re.fullmatch(r"([+-]?[\d.,]+)e([+-]\d+)", text)
-    if match:
-        return rf"${match[1]}\times10^{{{int(match[2])}}}$"
-    return f"${text}$" if re.fullmatch(r"[+-][\d.]+", text) else _latex(text)
 
 
 def _html_cell(table: Table, row: int, column: Column, best: bool) -> str:

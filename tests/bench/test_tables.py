@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from gripbench.bench import tables
+from gripbench.bench import latex, tables
 from gripbench.bench.tables import Column, Table
 from gripbench.errors import InputError
 
@@ -139,7 +139,8 @@ def test_latex_of_numbers_and_special_letters(table):
 
 @pytest.mark.skipif(shutil.which("pdflatex") is None, reason="no LaTeX engine (pdflatex) installed")
 def test_latex_compiles_with_plain_article_class(table, tmp_path):
-    brackets = Table((Column("a", "[A]"),), ({"a": "[1, 2]"}, {"a": "[3]"}))
+    letters = "".join(latex._LETTERS) + "†é10 m/s^2 a^-3"
+    brackets = Table((Column("a", "[A]"),), ({"a": "[1, 2]"}, {"a": "*3"}), letters, (letters,))
     document = tables.latex(table, standalone=True).replace(
         r"\end{document}", tables.latex(brackets) + r"\end{document}"
     )
