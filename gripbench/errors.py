@@ -18,6 +18,9 @@ class UndeclaredChannelError(GripbenchError):
     """A method read a channel, or wrote an estimate, that it did not declare."""
 
 
+_MOST_LISTED = 30
+
+
 def nearest(name: str, known: Iterable[str]) -> str:
     """Return a hint that names the nearest known name, or lists the known names.
 
@@ -30,6 +33,8 @@ def nearest(name: str, known: Iterable[str]) -> str:
     match = difflib.get_close_matches(name, options, n=1, cutoff=0.5)
     if match:
         return f"did you mean '{match[0]}'?"
+    if len(options) > _MOST_LISTED:
+        return f"none of the {len(options)} known names is like it"
     return "known: " + ", ".join(options)
 
 

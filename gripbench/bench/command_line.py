@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import pkgutil
 import sys
+from typing import NoReturn
 
 import typer
 
@@ -27,12 +28,29 @@ def application() -> typer.Typer:
 
 
 def main() -> None:
-    """Run the command line."""
+    """Run the command line; end with 2 on wrong usage or input, 130 when interrupted."""
     try:
-        application()()
+        code = application()(standalone_mode=False)
     except GripbenchError as error:
-        print(f"gripbench: {error}", file=sys.stderr)
-        sys.exit(2)
+        _stop(str(error), 2)
+    except (KeyboardInterrupt, typer.Abort):
+        _stop("interrupted; what had finished is kept", 130)
+    except Exception as error:
+        # wrong usage; typer's own class for it has moved between its versions
+        usage = getattr(error, "format_message", None)
+        if usage is None:
+            raise
+        message = " ".join(usage().split())
+        if not message or "no_args" in type(error).__name__.lower():
+            error.show()  # type: ignore[attr-defined]
+            sys.exit(2)
+        _stop(message[:1].lower() + message[1:], 2)
+    sys.exit(code or 0)
+
+
+def _stop(message: str, code: int) -> NoReturn:
+    print(f"gripbench: {message}", file=sys.stderr)
+    sys.exit(code)
 
 
 if __name__ == "__main__":
