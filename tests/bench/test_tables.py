@@ -150,6 +150,7 @@ def test_latex_compiles_with_plain_article_class(table, tmp_path):
         cwd=tmp_path,
         capture_output=True,
         text=True,
+        errors="replace",
         timeout=120,
     )
     assert done.returncode == 0, done.stdout[-2000:]
