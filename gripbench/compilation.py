@@ -36,12 +36,12 @@ class _Stamped:
         path = Path(py_file)
         if not path.is_file() or not imports_gripbench(path):
             return None
-        return super().from_function(py_func, py_file)  # type: ignore[misc]
+        return super().from_function(py_func, py_file)
 
 
-class BesideSource(_Stamped, InTreeCacheLocator):  # type: ignore[misc]
+class BesideSource(_Stamped, InTreeCacheLocator):
     """Cache beside the source, where that can be written."""
 
 
-class InUserFolder(_Stamped, UserWideCacheLocator):  # type: ignore[misc]
+class InUserFolder(_Stamped, UserWideCacheLocator):
     """Cache in the user's folder otherwise."""
