@@ -43,15 +43,15 @@ FRICTION_PARAMETERS = (
     Parameter("first_mu_std", 0.3, "-", "Its standard deviation", 1e-6, 10.0),
     Parameter("mu_walk", 0.005, "1/sqrt(s)", "Random walk of the friction", 0.0, 10.0),
     Parameter(
-        "accel_y_density", 0.05, "m/s^2 sqrt(s)",
+        "accel_y_density", 0.08, "m/s^2 sqrt(s)",
         "Noise density of the modelled lateral acceleration, mostly of the tyre model: "
-        "0.64 m/s^2 a sample at 166 Hz",
+        "1.03 m/s^2 a sample at 166 Hz",
         1e-9, 100.0,
     ),
     Parameter("printed_15", 0.0, "-", "1: slide for positive slip angles only", 0.0, 1.0),
     Parameter("printed_16", 0.0, "-", "1: compare with the accelerometer's reading", 0.0, 1.0),
     Parameter("least_slope", 0.3, "m/s^2", "Least |d a_y / d mu| of an update", 0.0, 100.0),
-    Parameter("least_accel", 0.6, "m/s^2", "Least |a_y| of an update", 0.0, 100.0),
+    Parameter("least_accel", 0.8, "m/s^2", "Least |a_y| of an update", 0.0, 100.0),
     Parameter("least_speed", 2.0, "m/s", "Least speed of an update", 0.1, 100.0),
 )  # fmt: skip
 
