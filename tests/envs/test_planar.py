@@ -1,4 +1,4 @@
-"""Runs of the planar world: determinism, ends, published figures, kinematics, refusals."""
+"""Runs of the planar world: determinism, ends, intended sideslip, kinematics, refusals."""
 
 import math
 
@@ -41,7 +41,7 @@ def test_every_scenario_runs_to_its_end_with_finite_truth(name):
 
 
 @pytest.mark.parametrize(
-    ("name", "published", "tolerance"),
+    ("name", "intended", "tolerance"),
     [
         ("double_lane_change_snow", 12.8, 0.1),
         ("slalom_snow", 18.8, 0.1),
@@ -51,16 +51,16 @@ def test_every_scenario_runs_to_its_end_with_finite_truth(name):
         ("two_turns", 1.05, 0.05),
     ],
 )
-def test_sideslip_reaches_what_the_study_of_the_scenario_gives(name, published, tolerance):
+def test_manoeuvres_saturate_the_tyres_as_they_are_meant_to(name, intended, tolerance):
     truth = simulation_of(name).run(1)
-    assert np.degrees(np.abs(truth["sideslip"]).max()) == pytest.approx(published, rel=tolerance)
+    assert np.degrees(np.abs(truth["sideslip"]).max()) == pytest.approx(intended, rel=tolerance)
 
 
 def test_lateral_acceleration_of_the_open_loop_cases():
-    for name, published in [("dakhlallah_mild", 4.2), ("dakhlallah_hard", 7.1)]:
+    for name, intended in [("dakhlallah_mild", 4.2), ("dakhlallah_hard", 7.1)]:
         truth = simulation_of(name).run(1)
         lateral = (truth["force_y_front"] + truth["force_y_rear"]) / 1550.0
-        assert np.abs(lateral).max() == pytest.approx(published, rel=0.1)
+        assert np.abs(lateral).max() == pytest.approx(intended, rel=0.1)
 
 
 def test_heading_is_drawn_by_the_seed_and_changes_nothing_else():
