@@ -31,7 +31,7 @@ def evidence(
         raise unknown("paper with evidence", paper, PAPERS)
     if table_format not in ("terminal", *tables.FORMATS):
         raise unknown("table format", table_format, ("terminal", *tables.FORMATS))
-    load_paper_tables(paper)
+    published = load_paper_tables(paper)
     with progress(f"{paper}: evidence", len(li2014.changes(1))) as bar:
-        found = li2014.evidence(lambda: bar.advance(bar.task_ids[0]))
+        found = li2014.evidence(published, lambda: bar.advance(bar.task_ids[0]))
     tables.show(found, table_format)

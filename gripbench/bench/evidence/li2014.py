@@ -26,7 +26,6 @@ from gripbench.envs.vehicles import GRAVITY, load_vehicle
 from gripbench.envs.worlds import load_scenario, record
 from gripbench.methods.proposed_observer import ProposedObserver
 
-PAPER = "li2014"
 _NOISY, _SIMPLE = "li2014_noisy_acceleration", "li2014_constant_mu"
 
 Recorder = Callable[[Scenario, int], Recording]
@@ -305,15 +304,18 @@ def changes(seeds: int) -> tuple[Change, ...]:
     )  # fmt: skip
 
 
-def evidence(advance: Callable[[], None] = lambda: None) -> tables.Table:
+def evidence(
+    paper: paper_tables.PaperTables, advance: Callable[[], None] = lambda: None
+) -> tables.Table:
     """Return the table: one row a change, with what becomes of the cells.
 
     Parameters
     ----------
+    paper
+        The published tables of this paper.
     advance
         Called after each row, for a progress bar.
     """
-    paper = paper_tables.load_paper_tables(PAPER)
     seeds = next(row.seeds for row in paper.scenarios if row.scenario == _NOISY)
     rows = []
     for change in changes(seeds):
