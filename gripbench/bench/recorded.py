@@ -87,18 +87,24 @@ def score_published(
     names
         Names of recordings; one whose files are absent gives one row that says so.
     methods
-        Choices of methods, `name[:variant][@parameter=number]`; by default every built-in.
+        Choices of methods, `name[:variant]`; by default every built-in. Those that the
+        recording's map has settings for get them.
     folder
         Where the files lie, see `gripbench.envs.logs.locations`.
     """
     scores: list[RecordedScore] = []
     for name in names:
         try:
-            recordings = load_recording(name, folder).recordings
+            imported = load_recording(name, folder)
         except AbsentDataError as error:
             scores.append(RecordedScore(name, "", "", "", "skipped", str(error)))
             continue
-        scores += score_recordings(recordings, [choose_method(m) for m in _chosen(methods)])
+        settings = imported.provenance.channel_map.get("settings", {})
+        chosen = [
+            choose_method(method, parameters=settings.get(method.partition(":")[0], {}))
+            for method in methods or list(built_in_methods())
+        ]
+        scores += score_recordings(imported.recordings, chosen)
     return scores
 
 
@@ -128,10 +134,6 @@ def score_recordings(
         found += _of_method(recordings, spec)
     order = {target: index for index, target in enumerate(TARGETS)}
     return sorted(found, key=lambda row: order.get(row.target, len(order)))
-
-
-def _chosen(methods: Sequence[str]) -> Sequence[str]:
-    return methods or list(built_in_methods())
 
 
 def _of_method(recordings: Sequence[Recording], spec: MethodSpec) -> list[RecordedScore]:
@@ -164,13 +166,19 @@ def _of_method(recordings: Sequence[Recording], spec: MethodSpec) -> list[Record
             except GripbenchError as error:
                 reason, status = str(error), "failed"
         reason = reason or "estimates nothing that the recording has a reference for"
-        return [RecordedScore(name, "", spec.label, "method", status, reason)]
+        return [RecordedScore(name, "", _label(spec), "method", status, reason)]
     rows = [
-        _scored(recordings, target, spec.label, "method", series[target]) for target in estimated
+        _scored(recordings, target, _label(spec), "method", series[target]) for target in estimated
     ]
     kept = [row for row in rows if row is not None]
     reason = "the recording has no reference for any of its estimates"
-    return kept or [RecordedScore(name, "", spec.label, "method", "skipped", reason)]
+    return kept or [RecordedScore(name, "", _label(spec), "method", "skipped", reason)]
+
+
+def _label(spec: MethodSpec) -> str:
+    """Return the method's name and variant; its settings are the recording's."""
+    name = spec.declaration.name
+    return f"{name}:{spec.variant}" if spec.variant else name
 
 
 def _scored(

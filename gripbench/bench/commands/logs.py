@@ -13,12 +13,20 @@ from rich.table import Table
 from gripbench.bench.recorded import RecordedScore, score_published
 from gripbench.bench.tables import Column, show
 from gripbench.bench.tables import Table as Table_
+from gripbench.bench.tuning import settings_text, tune_published
 from gripbench.envs.logs.channel_map import load_channel_map
+from gripbench.envs.logs.identification import (
+    identified_vehicle,
+    identify_steering,
+    identify_tyres,
+    write_vehicle,
+)
 from gripbench.envs.logs.importing import import_log
 from gripbench.envs.logs.inspection import inspect_log
 from gripbench.envs.logs.locations import VARIABLE, data_folder
-from gripbench.envs.logs.published import recording_files
+from gripbench.envs.logs.published import load_recording, recording_files
 from gripbench.envs.logs.storing import store
+from gripbench.envs.vehicles import load_vehicle
 from gripbench.errors import InputError
 
 
@@ -29,6 +37,8 @@ def register(app: typer.Typer) -> None:
     data.command("path")(path)
     app.add_typer(data, name="data")
     app.command("recordings")(recordings)
+    app.command("tune")(tune)
+    app.command("identify")(identify)
 
 
 def import_(
@@ -82,7 +92,7 @@ def recordings(
     ] = None,
     method: Annotated[
         list[str] | None,
-        typer.Option(help="name[:variant][@parameter=number]; by default every built-in method."),
+        typer.Option(help="name[:variant]; by default every built-in method."),
     ] = None,
     data: Annotated[
         Path | None, typer.Option(help="Folder of the files instead of the one that is set.")
@@ -99,6 +109,53 @@ def recordings(
     left_out = {(score.estimator, score.reason): None for score in scores if score.status != "ok"}
     for estimator, reason in left_out:
         print(f"no figure: {estimator or 'recording'}: {reason}", file=sys.stderr)
+
+
+def tune(
+    recording: Annotated[str, typer.Argument(help="Published recording.")],
+    method: Annotated[str, typer.Argument(help="name[:variant] of a built-in method.")],
+    target: Annotated[str, typer.Option(help="Signal whose error counts.")] = "sideslip",
+    draws: Annotated[int, typer.Option(min=1, help="Settings to try.")] = 60,
+    data: Annotated[
+        Path | None, typer.Option(help="Folder of the files instead of the one that is set.")
+    ] = None,
+) -> None:
+    """Tune a method's noise levels on the training windows of a recording."""
+    tuned = tune_published(recording, method, target, draws, data)
+    print(
+        f"# {tuned.draws} draws, {target} on the training windows: "
+        f"{tuned.before:.3g} before, {tuned.after:.3g} after"
+    )
+    print(settings_text(tuned))
+
+
+def identify(
+    recording: Annotated[str, typer.Argument(help="Published recording.")],
+    steering: Annotated[
+        bool, typer.Option(help="Fit the steering's scale and offset with the tyres.")
+    ] = True,
+    out: Annotated[
+        Path | None, typer.Option(help="Write the vehicle with the tyres found to this file.")
+    ] = None,
+    data: Annotated[
+        Path | None, typer.Option(help="Folder of the files instead of the one that is set.")
+    ] = None,
+) -> None:
+    """Identify tyres, or without a velocity reference the steering, from a recording."""
+    imported = load_recording(recording, data)
+    runs = imported.recordings
+    with_tyres = "speed_y" in (runs[0].truth.dtype.names or ())
+    found = identify_tyres(runs, steering) if with_tyres else identify_steering(runs)
+    for name, value in found.values.items():
+        print(f"{name:20} {value:10.4g}  standard deviation {found.deviations[name]:.2g}")
+    unseen = "" if found.test_rms is None else f", on the test windows {found.test_rms:.3g}"
+    print(f"unexplained RMS on the training windows {found.train_rms:.3g}{unseen} {found.unit}")
+    if out is not None:
+        if not with_tyres:
+            raise InputError(f"{recording}: without a velocity reference no tyres are identified")
+        vehicle = load_vehicle(str(imported.provenance.channel_map["vehicle"]))
+        write_vehicle(identified_vehicle(vehicle, found, recording), out)
+        print(f"written to {out}")
 
 
 def _table(scores: list[RecordedScore]) -> Table_:

@@ -247,6 +247,10 @@ class ChannelMap(Configuration):
     windows
         Named lists of intervals [s]: `train`, `test` and others. A score is taken over `test`
         where there is one.
+    settings
+        Parameters of methods, by method, that belong to the place or the vehicle (the earth's
+        field, the speed from which a small car's tyres tell something) or were tuned on the
+        training windows.
     score_from
         Samples before this time [s] do not count in any score.
     """
@@ -271,6 +275,7 @@ class ChannelMap(Configuration):
     derived: Derived = Derived()
     bounds: dict[str, tuple[Bound, ...]] = Field(default_factory=dict)
     windows: dict[str, tuple[tuple[float, float], ...]] = Field(default_factory=dict)
+    settings: dict[str, dict[str, float]] = Field(default_factory=dict)
     score_from: float = Field(default=0.0, ge=0.0)
 
     @field_validator("channels", "reference")

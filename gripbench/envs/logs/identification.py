@@ -95,8 +95,11 @@ def identify_tyres(recordings: Sequence[Recording], steering: bool = True) -> Id
         full[free] = part
         return full
 
+    def misfit(part: Floats) -> Floats:
+        return _axle_residuals(whole(part), train)
+
     fit = least_squares(
-        lambda part: _axle_residuals(whole(part), train),
+        misfit,
         first[free],
         bounds=(low[free], high[free]),
         x_scale=np.maximum(np.abs(first[free]), 0.01),
@@ -105,7 +108,7 @@ def identify_tyres(recordings: Sequence[Recording], steering: bool = True) -> Id
     )
     found = whole(fit.x)
     residuals = _axle_residuals(found, train)
-    spread = _deviations(fit.jac, residuals, train.correlated)
+    spread = _deviations(np.asarray(fit.jac), residuals, train.correlated)
     deviations = dict(zip(np.array(names)[free], spread, strict=True))
     return Identified(
         values={str(n): float(v) for n, v, f in zip(names, found, free, strict=True) if f},
