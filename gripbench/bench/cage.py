@@ -114,7 +114,7 @@ class Cage:
         try:
             # Sending may block on a process that no longer reads: it counts against the limit.
             with _Alarm(self, self.limits.time) as alarm:
-                connection.send(request)
+                connection.send((list(sys.path), request))
                 ready = connection.poll(max(deadline - time.monotonic(), 0.0))
                 answer = connection.recv() if ready else None
             if alarm.rang or not ready:
@@ -244,9 +244,10 @@ def _serve(descriptor: int, parent: int) -> None:
     connection.send("ready")
     while True:
         try:
-            request = connection.recv()
+            path, request = connection.recv()
         except (EOFError, OSError):
             return
+        sys.path.extend(place for place in path if place not in sys.path)
         answer = _answer(request)
         try:
             connection.send(answer)

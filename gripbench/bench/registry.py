@@ -23,7 +23,7 @@ import cloudpickle  # type: ignore[import-untyped]
 from pydantic import Field
 
 from gripbench import methods as built_in
-from gripbench.bench.declarations import Declaration, Source, declaration_of, make
+from gripbench.bench.declarations import Declaration, Source, declaration_of
 from gripbench.configuration import CONFIGS, Configuration, parse, read_toml
 from gripbench.envs.scenarios import Scenario
 from gripbench.envs.worlds import load_scenario, scenario_files
@@ -229,10 +229,6 @@ def choose_method(
         from gripbench.bench.cage import declare  # a plug-in's code runs in its cage only
 
         declaration = declare(source, variant, settings)
-    elif source.kind == "value":
-        declaration = declaration_of(
-            make(method, variant, settings, source.target), variant, settings
-        )
     else:
         declaration = declaration_of(source.make(variant, settings), variant, settings)
     if isolated and declaration.name in built_in_methods():

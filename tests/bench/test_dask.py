@@ -1,0 +1,48 @@
+"""A real local Dask cluster: the same scores, also when a worker is killed in the middle."""
+
+import os
+import signal
+
+import pytest
+
+import gripbench
+from gripbench.bench.api import plan_of
+from gripbench.bench.backends import Backend
+from gripbench.bench.runner import run_plan
+from gripbench.bench.store import Store, read_rows
+from gripbench.bench.summary import scores_csv
+
+distributed = pytest.importorskip("distributed")
+
+pytestmark = [
+    pytest.mark.filterwarnings("ignore"),  # those of a cluster whose worker is killed
+]
+
+
+def test_a_killed_worker_changes_nothing(short_scenario, tmp_path):
+    arguments = {"scenarios": [short_scenario], "methods": ["slip_slope"], "seeds": 60}
+    alone = gripbench.run(**arguments, results=tmp_path / "alone", workers=1)
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, dashboard_address=None
+        ) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        processes = list(client.run(os.getpid).values())
+        killed = []
+
+        def kill_one(row):
+            if not killed:
+                killed.append(processes[0])
+                os.kill(processes[0], signal.SIGKILL)
+
+        plan = plan_of("", [short_scenario], ["slip_slope"], 60)
+        report = run_plan(
+            plan,
+            Store(tmp_path / "cluster"),
+            Backend("dask", scheduler=cluster.scheduler_address),
+            on_row=kill_one,
+        )
+    assert killed
+    assert report.computed == 60
+    assert scores_csv(read_rows(tmp_path / "cluster")) == scores_csv(alone)
