@@ -41,7 +41,7 @@ def choices():
         yield from (f"{name}:{variant}" for variant in method.variants)
 
 
-@pytest.mark.parametrize("name", choices())
+@pytest.mark.parametrize("name", list(choices()))
 @pytest.mark.benchmark(group="batch")
 def test_batch_step(benchmark, name):
     spec = choose_method(name)
