@@ -36,7 +36,7 @@ class _Stamped:
         path = Path(py_file)
         if not path.is_file() or not imports_gripbench(path):
             return None
-        return super().from_function(py_func, py_file)
+        return super().from_function(py_func, py_file)  # type: ignore[misc]
 
 
 class BesideSource(_Stamped, InTreeCacheLocator):

@@ -107,9 +107,9 @@ class VehicleEnvironment(gymnasium.Env[Observation, npt.NDArray[np.float64]]):
         self._sensors = self.scenario.all_sensors()
         suite = self._suite(0)
         self._channels = suite.observation_type.names or ()
-        self.observation_space = observation_space(self._channels)
+        self.observation_space: spaces.Space[Any] = observation_space(self._channels)
         self.action_map = ActionMap.of(self.simulation.actions)
-        self.action_space = self.action_map.space
+        self.action_space: spaces.Space[Any] = self.action_map.space
         self._steps = 0
 
     def reset(

@@ -293,8 +293,8 @@ class LongitudinalSimulation(Simulation):
     def _start(self) -> None:
         speed = self.scenario.initial_speed
         self._x = np.array([speed, *[speed / self._plant["wheel_radius"][0]] * 2])
-        self._step = 1e-5
-        self._k = 0
+        self._step: float = 1e-5  # first step of the integrator [s]
+        self._k: int = 0
         self.termination = ""
 
     def _set_start_inputs(self) -> None:
@@ -375,7 +375,7 @@ class LongitudinalLanes(Lanes):
     def advance(self, actions: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
         """Hold the axle torques of each lane for one sample time."""
         first = self._runs[0]
-        for lane in np.flatnonzero(self._k % _CHUNK == 0):
+        for lane in map(int, np.flatnonzero(self._k % _CHUNK == 0)):
             self._jumps[lane] = self._runs[lane]._draw(_CHUNK)
         truth = np.zeros(len(self._runs), TRUTH_TYPE)
         _advance_lanes(
@@ -408,7 +408,7 @@ def _drive_lanes(k, sample_time, front, rear, torques):  # type: ignore[no-untyp
 
 
 @compiled
-def _advance_lanes(
+def _advance_lanes(  # type: ignore[no-untyped-def]
     k,
     sample_time,
     x,
@@ -422,7 +422,7 @@ def _advance_lanes(
     jumps,
     work,
     truth,
-):  # type: ignore[no-untyped-def]
+):
     front, rear, friction = profiles
     for lane in range(x.shape[0]):
         _command(k[lane], sample_time, front, rear, friction, grade, inputs[0])

@@ -33,7 +33,7 @@ from gripbench.methods import drivers
 
 def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a function over records; division by zero gives inf or NaN as in NumPy."""
-    return numba.njit(cache=True, error_model="numpy", nogil=True)(function)  # type: ignore[no-any-return]
+    return numba.njit(cache=True, error_model="numpy", nogil=True)(function)
 
 
 @runtime_checkable

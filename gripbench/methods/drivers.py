@@ -60,7 +60,7 @@ def _single(step: Callable[..., Any]) -> Callable[..., Any]:
     def single(state, obs, params, est):  # type: ignore[no-untyped-def]
         step(state[0], obs[0], params[0], est[0])
 
-    return single  # type: ignore[no-any-return]
+    return single
 
 
 @cache
@@ -70,7 +70,7 @@ def _loop(step: Callable[..., Any]) -> Callable[..., Any]:
         for k in range(obs.shape[0]):
             step(state[0], obs[k], params[0], est[k])
 
-    return loop  # type: ignore[no-any-return]
+    return loop
 
 
 def _call(method: CompiledMethod, function: Callable[..., Any], *records: npt.NDArray[Any]) -> None:

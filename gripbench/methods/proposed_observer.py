@@ -72,9 +72,9 @@ STATE = np.dtype([(name, np.float64) for name in _NAMES])
 
 
 @_inline
-def observed_speed(
+def observed_speed(  # type: ignore[no-untyped-def]
     speed, torque, wheel_acceleration, accel_x, mean_accel_x, grade, elapsed, params
-):  # type: ignore[no-untyped-def]
+):
     """Return v_hat [m/s] after one backward Euler step of eq. 24 (corrected).
 
     Parameters
@@ -85,8 +85,8 @@ def observed_speed(
         Sum of the axle torques [N m], braking negative.
     wheel_acceleration
         Sum of the axles' angular accelerations [rad/s^2].
-    accel_x
-        Accelerometer reading [m/s^2].
+    accel_x, mean_accel_x
+        Accelerometer reading at the end of the step, and its mean over the step [m/s^2].
     grade
         Road grade [rad], positive downhill.
     elapsed
