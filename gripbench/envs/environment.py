@@ -99,7 +99,7 @@ class VehicleEnvironment(gymnasium.Env[Observation, npt.NDArray[np.float64]]):
         Name of a scenario that ships, or path of its TOML file.
     """
 
-    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - Gymnasium's own declaration
+    metadata: dict[str, Any] = {"render_modes": []}
 
     def __init__(self, scenario: str) -> None:
         self.scenario = load_scenario(scenario)

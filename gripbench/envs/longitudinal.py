@@ -31,6 +31,7 @@ from gripbench.errors import GripbenchError
 PAPER_SOLVER = "paper"
 
 _FULL_TORQUE = 5000.0
+_FIRST_STEP = 1e-5  # of the integrator [s]; it then chooses its own
 _CHUNK = 1024  # process noise is drawn ahead in blocks; the stream is the same for any size
 
 
@@ -203,6 +204,7 @@ class LongitudinalSimulation(Simulation):
         self._profiles = tuple(segment_records(part) for part in self._segments)
         self._inputs = np.zeros(1, INPUT_TYPE)
         self._work = integrators.scratch()
+        self._step = _FIRST_STEP
         self._start()
 
     def reset(self, seed: int) -> npt.NDArray[Any]:
@@ -293,8 +295,8 @@ class LongitudinalSimulation(Simulation):
     def _start(self) -> None:
         speed = self.scenario.initial_speed
         self._x = np.array([speed, *[speed / self._plant["wheel_radius"][0]] * 2])
-        self._step: float = 1e-5  # first step of the integrator [s]
-        self._k: int = 0
+        self._step = _FIRST_STEP
+        self._k = 0
         self.termination = ""
 
     def _set_start_inputs(self) -> None:
@@ -394,7 +396,7 @@ class LongitudinalLanes(Lanes):
             truth,
         )
         self._k += 1
-        for lane in np.flatnonzero(~np.isfinite(self._x).all(axis=1)):
+        for lane in map(int, np.flatnonzero(~np.isfinite(self._x).all(axis=1))):
             self._ended[lane] = "diverged"
         return truth
 

@@ -112,10 +112,8 @@ def paper_solver(x0, stops, inputs, plant, front, rear, friction, grade, times, 
                 error = max(error, abs(step * difference) / scale)
             if error <= TOLERANCE:
                 break
-            if failed:
-                h = 0.5 * step
-            else:
-                h = step * max(0.1, 0.8 * (TOLERANCE / error) ** 0.2)
+            shrink = 0.5 if failed else max(0.1, 0.8 * (TOLERANCE / error) ** 0.2)
+            h = step * shrink
             failed = True
         if step == stops[stop] - time:
             time = stops[stop]

@@ -172,7 +172,7 @@ _BODY = (
     Signal("position_x", "m", "earth", "north", "", "Position of the centre of gravity, north"),
     Signal("position_y", "m", "earth", "west", "", "Position of the centre of gravity, west"),
     Signal("speed_y", "m/s", "vehicle", "left", "", "Lateral velocity v_y"),
-    Signal("sideslip", "rad", "vehicle", "moving to the left", "", "Sideslip angle atan2(v_y, v_x)"),
+    Signal("sideslip", "rad", "vehicle", "moving left", "", "Sideslip angle atan2(v_y, v_x)"),
     Signal("mu", "-", "-", "-", "", "Available friction coefficient, mean of the four wheels"),
     Signal("force_y_front", "N", "wheel", "left", "", "Lateral tyre force, front axle"),
     Signal("force_y_rear", "N", "wheel", "left", "", "Lateral tyre force, rear axle"),
@@ -224,7 +224,8 @@ def _of_each_wheel() -> list[Signal]:
             Signal(f"force_z_{wheel}", "N", "wheel", "up", "", f"Vertical load of the {place}"),
             Signal(f"mu_{wheel}", "-", "-", "-", "", f"Available friction at the {place}"),
             Signal(
-                f"mu_used_{wheel}", "-", "-", "-", "", f"Used friction of the {place}: force over load"
+                f"mu_used_{wheel}", "-", "-", "-", "",
+                f"Used friction of the {place}: force over load",
             ),
         ]  # fmt: skip
     return table

@@ -33,7 +33,7 @@ class VehicleVectorEnvironment(VectorEnv[Observations, npt.NDArray[np.float64], 
         Name of a scenario that ships, or path of its TOML file.
     """
 
-    metadata: dict[str, Any] = {"autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
+    metadata: dict[str, Any] = {"autoreset_mode": AutoresetMode.NEXT_STEP}
 
     def __init__(self, num_envs: int, scenario: str) -> None:
         self.num_envs = num_envs

@@ -75,7 +75,8 @@ def step(state, obs, params, est):  # type: ignore[no-untyped-def]
     """Take one sample: forces by eq. 21, slip by eq. 5, friction by eq. 11-15."""
     elapsed = 0.0
     if state.samples == 0.0:
-        state.wheel_speed_front, state.wheel_speed_rear = obs.wheel_speed_front, obs.wheel_speed_rear
+        state.wheel_speed_front = obs.wheel_speed_front
+        state.wheel_speed_rear = obs.wheel_speed_rear
     else:
         elapsed = obs.time - state.time
         state.wheel_speed_front, state.force_front = observer(
