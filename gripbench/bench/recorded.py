@@ -196,7 +196,7 @@ def _scored(
     outside: list[Floats] = []
     for recording, estimate in zip(recordings, series, strict=True):
         time = recording.truth["time"]
-        inside = tested(recording)
+        inside = scored_samples(recording)
         if bounded:
             for bound in (b for b in recording.bounds if b.signal == target):
                 within = inside & (time >= bound.start) & (time <= bound.end)
@@ -229,7 +229,7 @@ def _scored(
     )  # fmt: skip
 
 
-def tested(recording: Recording) -> npt.NDArray[np.bool_]:
+def scored_samples(recording: Recording) -> npt.NDArray[np.bool_]:
     """Return which samples count: those of the window `test`, or all where no window is named."""
     time = recording.truth["time"]
     inside = time >= recording.score_from

@@ -145,7 +145,12 @@ def identify(
     imported = load_recording(recording, data)
     runs = imported.recordings
     with_tyres = "speed_y" in (runs[0].truth.dtype.names or ())
-    found = identify_tyres(runs, steering) if with_tyres else identify_steering(runs)
+    if with_tyres:
+        found = identify_tyres(runs, steering)
+    else:
+        column = load_channel_map(recording_files()[recording]).channels["steer_angle"]
+        divisor = runs[0].vehicle[column.per] if column.per else 1.0
+        found = identify_steering(runs, column.scale / divisor)
     for name, value in found.values.items():
         print(f"{name:20} {value:10.4g}  standard deviation {found.deviations[name]:.2g}")
     unseen = "" if found.test_rms is None else f", on the test windows {found.test_rms:.3g}"
