@@ -27,7 +27,10 @@ REFERENCE = "test_reference_kernel"
 LABEL, FORM, STEPS = "label", "form", "steps"
 """Keys of a benchmark's `extra_info`: the method's label, `batch` or `online`, steps a call."""
 
-_MEDIAN_CONFIDENCE = 1.0 - 0.05 / 4.0  # four medians make a ratio of two relative runtimes
+QUANTILE = 0.25
+"""Quantile of the rounds that stands for a step: what else the machine does disturbs the median."""
+
+_CONFIDENCE = 1.0 - 0.05 / 4.0  # four quantiles make a ratio of two relative runtimes
 
 
 class RelativeRuntime(Configuration):
@@ -36,12 +39,12 @@ class RelativeRuntime(Configuration):
     Attributes
     ----------
     relative
-        Ratio of the medians.
+        Ratio of the lower quartiles of the rounds.
     low, high
-        Range of that ratio from the distribution-free intervals of both medians, wide enough that
+        Range of that ratio from distribution-free intervals of both quartiles, wide enough that
         two such ranges together hold with 95 %; None where there were too few rounds.
     step
-        Median time of a step [s] on the machine that timed it.
+        Lower quartile of the time of a step [s] on the machine that timed it.
     """
 
     relative: float = Field(gt=0.0)
@@ -106,23 +109,23 @@ class _Steps:
 
     def __init__(self, benchmark: dict[str, Any]) -> None:
         steps = benchmark["extra_info"][STEPS]
-        times = benchmark["stats"].get("data") or [benchmark["stats"]["median"]]
+        times = benchmark["stats"].get("data") or [benchmark["stats"]["q1"]]
         self._times: npt.NDArray[np.float64] = np.asarray(times, float) / steps
-        self.median = float(np.median(self._times))
+        self.typical = float(np.quantile(self._times, QUANTILE))
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Interval of the median from order statistics; NaN with too few rounds."""
-        test: Any = stats.quantile_test(self._times, p=0.5)
-        found = test.confidence_interval(_MEDIAN_CONFIDENCE)
+        """Interval of the quartile from order statistics; NaN with too few rounds."""
+        test: Any = stats.quantile_test(self._times, p=QUANTILE)
+        found = test.confidence_interval(_CONFIDENCE)
         return float(found.low), float(found.high)
 
     def relative_to(self, reference: _Steps) -> RelativeRuntime:
         (low, high), (reference_low, reference_high) = self.interval, reference.interval
         ends = low / reference_high, high / reference_low
         return RelativeRuntime(
-            relative=self.median / reference.median,
+            relative=self.typical / reference.typical,
             low=ends[0] if math.isfinite(ends[0]) else None,
             high=ends[1] if math.isfinite(ends[1]) else None,
-            step=self.median,
+            step=self.typical,
         )

@@ -42,6 +42,16 @@ def test_runtimes_relate_to_the_kernel_of_the_same_run(tmp_path):
     assert fast["batch"].low < fast["batch"].relative < fast["batch"].high
 
 
+def test_a_machine_that_is_busy_half_of_the_time_changes_little(tmp_path):
+    path = benchmark_file(tmp_path / "b.json")
+    content = json.loads(path.read_text())
+    for index, time in enumerate(content["benchmarks"][0]["stats"]["data"]):
+        content["benchmarks"][0]["stats"]["data"][index] = time * (5.0 if index % 2 else 1.0)
+    calm = read_timings(path)["a"]["batch"].relative
+    path.write_text(json.dumps(content))
+    assert read_timings(path)["a"]["batch"].relative == pytest.approx(calm, rel=0.02)
+
+
 def test_too_few_rounds_give_no_range(tmp_path):
     found = read_timings(benchmark_file(tmp_path / "few.json", rounds=3))["a"]["batch"]
     assert found.low is None

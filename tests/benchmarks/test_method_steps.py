@@ -42,7 +42,7 @@ def choices():
 
 
 @pytest.mark.parametrize("name", list(choices()))
-@pytest.mark.benchmark(group="batch")
+@pytest.mark.benchmark(group="batch", min_rounds=20)
 def test_batch_step(benchmark, name):
     spec = choose_method(name)
     drive = drive_for(spec)
@@ -55,7 +55,7 @@ def test_batch_step(benchmark, name):
 
 
 @pytest.mark.parametrize("name", built_in_methods())
-@pytest.mark.benchmark(group="online")
+@pytest.mark.benchmark(group="online", min_rounds=20)
 def test_online_step(benchmark, name):
     spec = choose_method(name)
     drive = drive_for(spec)
