@@ -46,7 +46,7 @@ def test_every_claim_has_its_figure_and_one_seed_shows_the_order():
     steps = []
     claims = {
         claim.item: claim
-        for claim in yoon2015.reproduce(lambda done, total: steps.append((done, total)), seeds=[2])
+        for claim in yoon2015.reproduce(lambda done, total: steps.append((done, total)), seeds=[4])
     }
     assert steps[-1] == (10, 10)
     assert set(claims) == {claim.item for claim in paper.claims}
