@@ -51,13 +51,16 @@ DUGOFF_STATE = np.dtype(
 )
 """State of the filter with the model's last evaluation; wheels fl, fr, rl, rr."""
 
+_FIRST_SAMPLE = 0.01
+"""Time [s] over which the first reading counts, which has no predecessor."""
+
 DUGOFF_PARAMETERS = (
     Parameter("friction", 0.8, "-", "Friction coefficient that the tyre model assumes", 0.01, 2.0),
     Parameter("speed_x_walk", 2e-2, "m^2/s^3", "Process noise of v_x", 0.0),
     Parameter("speed_y_walk", 0.15, "m^2/s^3", "Process noise of v_y", 0.0),
     Parameter("yaw_rate_walk", 1e-2, "rad^2/s^3", "Process noise of the yaw rate", 0.0),
-    Parameter("speed_x_noise", 0.05, "m/s", "Noise of the speed sensor", 1e-9),
-    Parameter("yaw_rate_noise", 1.745e-3, "rad/s", "Noise of the yaw rate sensor", 1e-9),
+    Parameter("speed_x_noise", 5e-3, "m/s/sqrt(Hz)", "Density of the speed sensor's noise", 1e-9),
+    Parameter("yaw_rate_noise", 1.745e-4, "rad/s/sqrt(Hz)", "Density of the gyro's noise", 1e-9),
     Parameter("speed_y_std", 0.1, "m/s", "Standard deviation of v_y at the start", 0.0),
     Parameter("lowest_speed", 2.0, "m/s", "Speed below which the slips are held at it", 0.1),
     Parameter("correction", 1.0, "-", "0: the model alone, open loop", 0.0, 1.0),
@@ -181,12 +184,14 @@ def _predict(state, obs, params):  # type: ignore[no-untyped-def]
 
 @compiled
 def _correct(state, obs, params):  # type: ignore[no-untyped-def]
+    # Noise densities: a reading that is held over several samples counts as one.
     filter = state.filter
     x, h = filter.x, filter.h
+    elapsed = max(obs.time - state.time, 1e-6)
     h[0], h[1], h[2] = 1.0, 0.0, 0.0
-    correct_scalar(filter, obs.speed_x - x[0], params.speed_x_noise**2)
+    correct_scalar(filter, obs.speed_x - x[0], params.speed_x_noise**2 / elapsed)
     h[0], h[1], h[2] = 0.0, 0.0, 1.0
-    correct_scalar(filter, obs.yaw_rate - x[2], params.yaw_rate_noise**2)
+    correct_scalar(filter, obs.yaw_rate - x[2], params.yaw_rate_noise**2 / elapsed)
 
 
 @compiled
@@ -203,9 +208,9 @@ def _step(state, obs, params, est):  # type: ignore[no-untyped-def]
     x, P, wheels = filter.x, filter.P, state.wheels
     if state.samples == 0.0:
         x[0], x[2] = obs.speed_x, obs.yaw_rate
-        P[0, 0] = params.speed_x_noise**2
+        P[0, 0] = params.speed_x_noise**2 / _FIRST_SAMPLE
         P[1, 1] = params.speed_y_std**2
-        P[2, 2] = params.yaw_rate_noise**2
+        P[2, 2] = params.yaw_rate_noise**2 / _FIRST_SAMPLE
     else:
         _predict(state, obs, params)
         if params.correction > 0.0:
@@ -284,7 +289,7 @@ class DugoffEkf(CompiledMethod):
         "cornering_stiffness_rear",
     )
     parameters = DUGOFF_PARAMETERS
-    variants = {  # noqa: RUF012
+    variants = {
         "paper": {
             "printed_step": 1.0,
             "load_transfer_track": 0.5,

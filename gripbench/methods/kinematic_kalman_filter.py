@@ -144,7 +144,7 @@ class KinematicKalmanFilter(CompiledMethod):
     estimates = ("sideslip", "yaw", "yaw_rate", "gyro_bias", "gyro_scale")
     variances = ("sideslip", "yaw", "gyro_bias", "gyro_scale")
     parameters = KINEMATIC_PARAMETERS
-    variants = {"paper": {"printed_equations": 1.0}, "scale_factor": {"gyro_scale_std": 0.02}}  # noqa: RUF012
+    variants = {"paper": {"printed_equations": 1.0}, "scale_factor": {"gyro_scale_std": 0.02}}
     state = KINEMATIC_STATE
     start = staticmethod(start_kinematic)
     step = staticmethod(_step)

@@ -272,9 +272,9 @@ class ModelBasedKalmanFilter(CompiledMethod):
     variances = MODEL_BASED_VARIANCES
     vehicle_parameters = SINGLE_TRACK
     parameters = MODEL_BASED_PARAMETERS
-    variants = {"paper": {"printed_equations": 1.0}, "bank": {}}  # noqa: RUF012
-    sensors_of = {"bank": (*MODEL_BASED_SENSORS, "road_bank")}  # noqa: RUF012
-    steps_of = {"bank": _step_with_bank}  # noqa: RUF012
+    variants = {"paper": {"printed_equations": 1.0}, "bank": {}}
+    sensors_of = {"bank": (*MODEL_BASED_SENSORS, "road_bank")}
+    steps_of = {"bank": _step_with_bank}
     state = MODEL_BASED_STATE
     start = staticmethod(start_model_based)
     step = staticmethod(_step)

@@ -126,7 +126,7 @@ def test_agrees_with_filterpy(run):
     set_ = method.settings
     twin = ExtendedKalmanFilter(dim_x=3, dim_z=2)
     twin.x = np.array([obs["speed_x"][0], 0.0, obs["yaw_rate"][0]])
-    noise = (set_["speed_x_noise"], set_["yaw_rate_noise"])
+    noise = 10.0 * np.array([set_["speed_x_noise"], set_["yaw_rate_noise"]])  # at 100 Hz
     twin.P = np.diag(np.square([noise[0], set_["speed_y_std"], noise[1]]))
     twin.R = np.diag(np.square(noise))
     walk = np.diag([set_["speed_x_walk"], set_["speed_y_walk"], set_["yaw_rate_walk"]])
@@ -144,6 +144,17 @@ def test_agrees_with_filterpy(run):
         np.testing.assert_allclose([ours[k][s] for s in STATES], twin.x, rtol=1e-9, atol=1e-9)
     for i, name in enumerate(STATES):
         assert ours[name + "_variance"][-1] == pytest.approx(twin.P[i, i], rel=1e-9)
+
+
+def test_held_readings_count_once(run):
+    """Each sample shown five times at five times the rate: the same knowledge, nearly."""
+    obs = run.observations[:600]
+    held = np.repeat(obs, 5)
+    held["time"] = obs["time"][0] + 0.002 * np.arange(len(held))
+    plain = DugoffEkf().run(VEHICLE, obs)
+    fine = DugoffEkf().run(VEHICLE, held)
+    name = "sideslip_variance"
+    assert fine[name][-1] == pytest.approx(plain[name][-1], rel=0.15)
 
 
 def test_a_mirrored_drive_gives_mirrored_estimates(run):
