@@ -165,6 +165,7 @@ SYMBOLS: Mapping[str, str] = {
     "mu_rear": "Friction coefficient (rear)",
     "mu": "Friction coefficient",
     "speed_x": "Longitudinal velocity",
+    "speed_y": "Lateral velocity",
     "sideslip": "Sideslip angle",
     "yaw_rate": "Yaw rate",
 }
