@@ -209,3 +209,31 @@ def test_a_moved_project_keeps_its_results(plugin, tmp_path):
     first = choose_method(str(plugin / "first.py")).digest
     shutil.copytree(plugin, tmp_path / "elsewhere")
     assert choose_method(str(tmp_path / "elsewhere" / "first.py")).digest == first
+
+
+@pytest.mark.filterwarnings("ignore")  # joblib's, about the worker that is killed here
+def test_a_killed_worker_process_changes_nothing(short_scenario, tmp_path):
+    plan = Plan((find_scenario(short_scenario),), tuple(map(choose_method, METHODS)), range(60))
+    run(plan, tmp_path / "alone")
+    killed = []
+
+    def kill_one(row):
+        if not killed:
+            killed.append(_a_loky_worker())
+            os.kill(killed[0], signal.SIGKILL)
+
+    report = run_plan(plan, Store(tmp_path / "r"), Backend(workers=2), on_row=kill_one)
+    assert killed
+    assert report.computed == 120
+    assert scores_csv(read_rows(tmp_path / "r")) == scores_csv(read_rows(tmp_path / "alone"))
+
+
+def _a_loky_worker():
+    me = os.getpid()
+    for task in os.listdir(f"/proc/{me}/task"):
+        with open(f"/proc/{me}/task/{task}/children", encoding="ascii") as file:
+            for child in file.read().split():
+                with open(f"/proc/{child}/cmdline", "rb") as command:
+                    if b"popen_loky" in command.read():
+                        return int(child)
+    raise AssertionError("no worker process found")
