@@ -8,8 +8,8 @@ its estimate on, the heading's variance goes into the noise of the GPS velocity.
 Variants: `paper` has the equations as printed and the sensor noise of Table 1; eq. 8 and 12 cannot
 be run as printed (eq. 9 contradicts eq. 8, and eq. 12 gives the complement of the angle) and are
 corrected there too. `table_1_noise` has all errata corrected and the noise of Table 1, without the
-allowance for pitch, for the roll on the springs and for the hard iron. `pitch_aware` is meant for public roads. The others
-leave one part out.
+allowance for pitch, for the roll on the springs and for the hard iron. `pitch_aware` is meant for
+public roads. The others leave one part out.
 """
 
 from __future__ import annotations
