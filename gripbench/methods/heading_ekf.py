@@ -355,7 +355,7 @@ class HeadingEkf(CompiledMethod):
     variances = ("yaw", "roll")
     vehicle_parameters = HEADING_VEHICLE
     parameters = HEADING_PARAMETERS
-    variants = {  # noqa: RUF012
+    variants = {
         "paper": PRINTED_HEADING,
         "table_1_noise": TABLE_1_NOISE,
         "pitch_aware": PITCH_AWARE,

@@ -93,7 +93,7 @@ class MagnetometerGpsCascade(CompiledMethod):
     variances = ("sideslip", "mu", "yaw", "roll", "speed_x", "speed_y")
     vehicle_parameters = (*HEADING_VEHICLE, *FRICTION_VEHICLE)
     parameters = (*HEADING_PARAMETERS, *SIDESLIP_PARAMETERS, *FRICTION_PARAMETERS)
-    variants = {  # noqa: RUF012
+    variants = {
         "paper": PRINTED_HEADING | {"printed_15": 1.0, "printed_16": 1.0},
         "table_1_noise": TABLE_1_NOISE,
         "pitch_aware": PITCH_AWARE,
