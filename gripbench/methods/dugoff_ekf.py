@@ -26,7 +26,7 @@ gives it; here it is the channel of an optical speed sensor.
 
 from __future__ import annotations
 
-from math import atan2, cos, hypot, sin
+from math import atan2, cos, sin, sqrt
 
 import numpy as np
 
@@ -81,6 +81,7 @@ def evaluate(state, params):  # type: ignore[no-untyped-def]
     half = 0.5 * params.mass / base
     pitch = half * params.cg_height * state.accel_x
     stiffness_x = 0.5 * params.longitudinal_stiffness
+    front_c, front_s = cos(state.steer_angle), sin(state.steer_angle)
     rate[0], rate[1], rate[2] = x[2] * x[1], -x[2] * x[0], 0.0
     slope[0, 0], slope[0, 1], slope[0, 2] = 0.0, x[2], x[1]
     slope[1, 0], slope[1, 1], slope[1, 2] = -x[2], 0.0, -x[0]
@@ -89,12 +90,12 @@ def evaluate(state, params):  # type: ignore[no-untyped-def]
         front = i < 2
         if front:
             track, lx, other = params.track_front, params.cg_to_front, params.cg_to_rear
-            angle = state.steer_angle
+            c, s = front_c, front_s
             stiffness_y = 0.5 * params.cornering_stiffness_front
             load = half * other * GRAVITY - pitch
         else:
             track, lx, other = params.track_rear, -params.cg_to_rear, params.cg_to_front
-            angle = 0.0
+            c, s = 1.0, 0.0
             stiffness_y = 0.5 * params.cornering_stiffness_rear
             load = half * other * GRAVITY + pitch
         side = 1.0 if i % 2 == 0 else -1.0  # left, right
@@ -102,7 +103,6 @@ def evaluate(state, params):  # type: ignore[no-untyped-def]
         load -= side * 2.0 * half * other * params.cg_height * state.accel_y / arm
         load = max(load, 0.0)
         ly = side * 0.5 * track
-        c, s = cos(angle), sin(angle)
         along_r, across_r = s * lx - c * ly, c * lx + s * ly
         along = c * x[0] + s * x[1] + along_r * x[2]
         across = c * x[1] - s * x[0] + across_r * x[2]
@@ -199,7 +199,7 @@ def _used(wheels, i):  # type: ignore[no-untyped-def]
     """Return the used friction of a wheel, 0 for one in the air."""
     if wheels[i, 2] <= 0.0:
         return 0.0
-    return hypot(wheels[i, 0], wheels[i, 1]) / wheels[i, 2]
+    return sqrt(wheels[i, 0] ** 2 + wheels[i, 1] ** 2) / wheels[i, 2]
 
 
 @compiled

@@ -9,7 +9,7 @@ model has 1 - |lambda|. `printed = 1` keeps the printed form.
 
 from __future__ import annotations
 
-from math import hypot
+from math import sqrt
 
 from gripbench.methods.kalman import compiled_step
 
@@ -64,7 +64,7 @@ def dugoff_force(linear_x, linear_y, capacity):  # type: ignore[no-untyped-def]
     capacity
         mu F_z [N].
     """
-    size = hypot(linear_x, linear_y)
+    size = sqrt(linear_x * linear_x + linear_y * linear_y)
     if 2.0 * size <= capacity:
         return linear_x, linear_y, 1.0, 0.0, 1.0
     ratio = 0.5 * capacity / size
