@@ -138,10 +138,10 @@ def printed_stiffness_law(run: Recording) -> str:
 
 
 def tyre_slope() -> str:
-    """Return the slope of the Magic Formula of the front axle beside C_s."""
+    """Return the slope of the Magic Formula of a front tyre beside C_s."""
     car = load_vehicle("li2014").values()
     slope = car["magic_b"] * car["magic_c"] * 0.9 * plant_record(car)["load_front"][0]
-    return f"Magic Formula, front axle, friction 0.9: {slope:.0f} N; C_s is 50000 N"
+    return f"Magic Formula, one front tyre, friction 0.9: {slope / 2.0:.0f} N; C_s is 50000 N"
 
 
 def friction_map() -> str:
