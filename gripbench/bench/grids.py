@@ -105,8 +105,12 @@ def chosen_instruments(given: str | Iterable[str]) -> tuple[str, ...]:
 
 def on_board(
     rows: pd.DataFrame, target: str, allowed: tuple[str, ...] | None = None
-) -> list[pd.DataFrame]:
+) -> list[tuple[pd.DataFrame, list[str]]]:
     """Return the rows of the methods of a board, in parts that can be compared.
+
+    A scenario in which a method was skipped, because it lacks a sensor or a vehicle parameter, is
+    left out: that is not the method's failure, and an easier set of scenarios no merit. Each part
+    comes with notes on what was left out.
 
     Methods that share no scenario, not even by way of others, come in different parts: those of
     a longitudinal and of a lateral suite that estimate the same signal, say. Being skipped in a
@@ -141,8 +145,20 @@ def on_board(
         part = lines[lines["scenario"].isin(scenarios)]
         # what is at home in another part is a stranger here
         elsewhere = {label for label, home in homes.items() if not home & scenarios}
-        parts.append(part[~part["label"].isin(elsewhere)])
+        parts.append(_where_all_run(part[~part["label"].isin(elsewhere)], set(homes.index)))
     return parts
+
+
+def _where_all_run(part: pd.DataFrame, ran: set[str]) -> tuple[pd.DataFrame, list[str]]:
+    """Leave out the scenarios in which a method was skipped that ran elsewhere."""
+    skipped = part[(part["status"] == "skipped") & part["label"].isin(ran)]
+    left_out = sorted(skipped["scenario"].unique())
+    rest = part[~part["scenario"].isin(left_out)]
+    if not left_out:
+        return part, []
+    if rest.empty:
+        return part, ["No scenario gives every method what it needs: skipped runs count as failed."]
+    return rest, [f"Left out, as not every method can run there: {', '.join(left_out)}."]
 
 
 def _connected(groups: Iterable[set[str]]) -> list[set[str]]:
@@ -155,7 +171,7 @@ def _connected(groups: Iterable[set[str]]) -> list[set[str]]:
     return sorted(unions, key=min)
 
 
-def grid_of(lines: pd.DataFrame, target: str) -> Grid:
+def grid_of(lines: pd.DataFrame, target: str, notes: Iterable[str] = ()) -> Grid:
     """Return the common runs of the methods of a board.
 
     Parameters
@@ -164,6 +180,8 @@ def grid_of(lines: pd.DataFrame, target: str) -> Grid:
         Rows of a board, one of the parts that `on_board` returns.
     target
         Signal that is estimated.
+    notes
+        What was left out already.
 
     Raises
     ------
@@ -177,7 +195,7 @@ def grid_of(lines: pd.DataFrame, target: str) -> Grid:
             f"{target}: '{first['label']}' has two rows for seed {first['seed']} of "
             f"'{first['scenario']}'"
         )
-    common, notes = _common_seeds(lines, target)
+    common, more_notes = _common_seeds(lines, target)
     repeated = sorted(name for name, seeds in common.items() if len(seeds) > 1)
     seeds = _over_scenarios({name: common[name] for name in repeated}, target)
     single = sorted(set(common) - set(repeated))
@@ -202,7 +220,7 @@ def grid_of(lines: pd.DataFrame, target: str) -> Grid:
         sums_of_squares=tables.of("sum_of_squares", repeated, len(seeds)),
         counts=tables.of("count", repeated, len(seeds)),
         single_rms=tables.of("rms", single, 1)[:, 0, :],
-        notes=tuple(notes),
+        notes=(*notes, *more_notes),
     )
 
 

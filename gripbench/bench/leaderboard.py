@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -81,7 +81,10 @@ class Leaderboard(Configuration):
 
 
 def build(
-    rows: pd.DataFrame, timings: Timings | None = None, confidence: float = CONFIDENCE
+    rows: pd.DataFrame,
+    timings: Timings | None = None,
+    confidence: float = CONFIDENCE,
+    targets: Iterable[str] = (),
 ) -> tuple[Leaderboard, list[Board]]:
     """Return the leaderboard of these rows, and its boards.
 
@@ -95,12 +98,16 @@ def build(
         As `gripbench.bench.timings.read_timings` returns them; None: no relative runtimes.
     confidence
         Confidence of ranks and intervals.
+    targets
+        Signals to rank by; empty: all.
 
     Raises
     ------
     InputError
         If there is nothing to rank, see `gripbench.bench.ranking.rank`.
     """
+    chosen = set(targets) or set(rows["target"])
+    rows = rows[rows["target"].isin(chosen)]
     found = boards(rows, confidence=confidence)
     for target in dict.fromkeys(board.target for board in found):
         if len({board.sensors for board in found if board.target == target}) > 1:

@@ -170,8 +170,9 @@ def boards(
         ran = rows[(rows["target"] == name) & (rows["status"] != "skipped")]
         for allowed in sensor_sets(ran) if given == () else [given]:
             parts = on_board(rows, name, allowed)
-            for lines in parts:
-                found.append(_board(lines, name, allowed, len(parts) > 1, settings))
+            for lines, notes in parts:
+                grid = grid_of(lines, name, notes)
+                found.append(_board(grid, allowed, len(parts) > 1, settings))
     if not found:
         raise InputError("nothing to rank: every run was skipped")
     return found
@@ -195,13 +196,9 @@ def _only(rows: pd.DataFrame, column: str, chosen: Iterable[str]) -> pd.DataFram
 
 
 def _board(
-    rows: pd.DataFrame,
-    target: str,
-    allowed: tuple[str, ...] | None,
-    one_of_several: bool,
-    settings: _Settings,
+    grid: Grid, allowed: tuple[str, ...] | None, one_of_several: bool, settings: _Settings
 ) -> Board:
-    grid = grid_of(rows, target)
+    target = grid.target
     scenarios = tuple(sorted((*grid.scenarios, *grid.single)))
     title = f"{target} with {'any sensors' if allowed is None else ', '.join(allowed)}"
     ranks, p_better = _ranks(grid, settings)

@@ -200,7 +200,33 @@ def test_methods_without_a_common_scenario_stand_on_different_boards():
     rows += noisy_rows({"e": 9.0}, seeds=4, scenarios=("step", "hill", "bend"))
     (board,) = boards(frame_of(rows))
     assert list(board.lines["label"]) == ["e", "a", "b", "c", "d"]
-    assert list(board.lines["failures"]) == [0, 4, 4, 8, 8]
+    assert list(board.lines["failures"]) == [0, 4, 4, 4, 4]  # without the step
+
+
+def test_scenario_that_lacks_a_method_s_sensors_is_no_failure_of_it():
+    rows = noisy_rows({"a": 2.0}, seeds=4, scenarios=("step", "hill"))
+    rows += noisy_rows({"g": 1.0}, seeds=4, scenarios=("step",), g={"sensors": GPS})
+    rows += [row("g", seed, None, "hill", status="skipped", sensors=GPS) for seed in range(4)]
+    plain, with_gps = boards(frame_of(rows))
+    assert plain.scenarios == ("hill", "step")
+    assert with_gps.scenarios == ("step",)
+    assert list(with_gps.lines["label"]) == ["g", "a"]
+    assert list(with_gps.lines["failures"]) == [0, 0]
+    assert with_gps.notes == ("Left out, as not every method can run there: hill.",)
+    # where no scenario is left, skipped runs count
+    rows = noisy_rows({"a": 1.0, "b": 1.0}, seeds=2, scenarios=("step", "hill"))
+    lacking = {("a", "step"), ("b", "hill")}
+    rows = [item for item in rows if (item.label, item.scenario) not in lacking]
+    rows += [
+        row(label, seed, None, scenario, status="skipped")
+        for label, scenario in lacking
+        for seed in (0, 1)
+    ]
+    rows += noisy_rows({"c": 9.0}, seeds=2, scenarios=("step", "hill"))
+    (board,) = boards(frame_of(rows))
+    assert list(board.lines["label"]) == ["c", "a", "b"]
+    assert list(board.lines["failures"]) == [0, 2, 2]
+    assert "skipped runs count" in board.notes[0]
 
 
 def test_pareto_front_of_score_and_runtime():

@@ -22,8 +22,13 @@ def leaderboard(
         typer.Option(help="Folder for leaderboard.md, .csv and .json; by default --results."),
     ] = None,
     suite: Annotated[
-        str, typer.Option(help="Only the scenarios of this suite; by default all rows.")
-    ] = "",
+        list[str] | None,
+        typer.Option(help="Only the scenarios and targets of this suite; repeat for more."),
+    ] = None,
+    target: Annotated[
+        list[str] | None,
+        typer.Option(help="Signal to rank by; repeat for more. By default the suites' targets."),
+    ] = None,
     timings: Annotated[
         Path | None,
         typer.Option(help="JSON of pytest-benchmark for runtimes relative to the reference."),
@@ -44,22 +49,29 @@ def leaderboard(
 ) -> None:
     """Build the leaderboard of stored rows; with --compare, fail if a method became worse."""
     from gripbench.bench.leaderboard import build, read, write
-    from gripbench.bench.registry import find_scenario, load_suite
+    from gripbench.bench.registry import find_scenario, load_suite, suite_files
     from gripbench.bench.regressions import changes_table
     from gripbench.bench.regressions import compare as compare_leaderboards
     from gripbench.bench.store import read_rows, write_atomically
     from gripbench.bench.tables import format_of, render, show
     from gripbench.bench.timings import read_timings
-    from gripbench.errors import InputError
+    from gripbench.errors import InputError, unknown
 
     base = read(compare) if compare is not None else None  # before --out may replace it
     if report is not None:
         format_of(report)
-    names = [find_scenario(item).name for item in load_suite(suite).scenarios] if suite else []
-    rows = read_rows(results, tuple(names))
+    suites = [load_suite(name) for name in suite or suite_files()]
+    names = [find_scenario(item).name for each in suites for item in each.scenarios]
+    rows = read_rows(results, tuple(names) if suite else ())
     if rows.empty:
         raise InputError(f"{results}: no stored rows to rank; 'gripbench run' makes them")
-    current, boards = build(rows, read_timings(timings) if timings else None, confidence)
+    known = set(rows["target"])
+    for name in target or ():
+        if name not in known:
+            raise unknown("target", name, known)
+    targets = set(target or (name for each in suites for name in each.targets)) & known
+    relative = read_timings(timings) if timings else None
+    current, boards = build(rows, relative, confidence, targets)
     for path in write(out or results, current, boards):
         print(f"wrote {path}")
     if base is None:
