@@ -20,6 +20,7 @@ import gripbench
 from gripbench.bench.board_tables import Timings, board_table
 from gripbench.bench.grids import ANY
 from gripbench.bench.ranking import Board, boards
+from gripbench.bench.registry import load_suite, suite_files
 from gripbench.bench.statistics import CONFIDENCE
 from gripbench.bench.store import write_atomically
 from gripbench.bench.tables import markdown
@@ -78,6 +79,12 @@ class Leaderboard(Configuration):
     boards: tuple[dict[str, Any], ...]
     runtimes: dict[str, dict[str, RelativeRuntime]] = Field(default_factory=dict)
     runs: tuple[Runs, ...]
+
+
+def usual_targets(rows: pd.DataFrame) -> list[str]:
+    """Return the targets of these rows that the shipped suites name; empty: they name none."""
+    named = {name for suite in suite_files() for name in load_suite(suite).targets}
+    return sorted(named & set(rows["target"]))
 
 
 def build(

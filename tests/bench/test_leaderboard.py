@@ -3,7 +3,7 @@ import json
 
 import numpy as np
 import pytest
-from synthetic_rows import GPS, noisy_frame, noisy_rows, row
+from synthetic_rows import GPS, noisy_frame, noisy_rows, row, score
 from typer.testing import CliRunner
 
 from gripbench.bench import leaderboard, timings
@@ -204,6 +204,31 @@ def test_rank_command_prints_boards_and_wins(stored):
     assert "wins in 12 runs" in shown.output
     lines = command("rank", "--results", stored, "--sensors", "any", "--format", "csv").output
     assert [line.split(",")[0] for line in lines.splitlines()[1:]] == ["1", "2", "3", "4"]
+
+
+def test_commands_rank_by_the_targets_of_the_suites_unless_told_otherwise(tmp_path):
+    store = Store(tmp_path)
+    for target in ("mu_front", "roll"):
+        for label in ("a", "b"):
+            for seed in (0, 1):
+                item = row(label, seed, 1.0 + seed, target=target)
+                path = tmp_path / target
+                Store(path).write(item)
+                both = {name: score(1.0 + seed) for name in ("mu_front", "roll")}
+                store.write(item.model_copy(update={"scores": both, "targets": tuple(both)}))
+    for folder, options, shown in [
+        (tmp_path, (), {"mu_front"}),
+        (tmp_path, ("--target", "roll"), {"roll"}),
+        (tmp_path / "roll", (), {"roll"}),  # no suite names it, but there is nothing else
+    ]:
+        assert command("leaderboard", "--results", folder, *options).exit_code == 0
+        made = read(folder)
+        assert {board["target"] for board in made.boards} == shown
+        assert {runs.target for runs in made.runs} == shown
+        output = command("rank", "--results", folder, *options).output
+        assert {name for name in ("mu_front", "roll") if f"{name} with" in output} == shown
+    failed = command("leaderboard", "--results", tmp_path, "--target", "rol")
+    assert "did you mean 'roll'" in str(failed.exception)
 
 
 def test_commands_without_rows_say_what_to_do(tmp_path):

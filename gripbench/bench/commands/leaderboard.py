@@ -48,8 +48,8 @@ def leaderboard(
     ] = None,
 ) -> None:
     """Build the leaderboard of stored rows; with --compare, fail if a method became worse."""
-    from gripbench.bench.leaderboard import build, read, write
-    from gripbench.bench.registry import find_scenario, load_suite, suite_files
+    from gripbench.bench.leaderboard import build, read, usual_targets, write
+    from gripbench.bench.registry import find_scenario, load_suite
     from gripbench.bench.regressions import changes_table
     from gripbench.bench.regressions import compare as compare_leaderboards
     from gripbench.bench.store import read_rows, write_atomically
@@ -60,7 +60,7 @@ def leaderboard(
     base = read(compare) if compare is not None else None  # before --out may replace it
     if report is not None:
         format_of(report)
-    suites = [load_suite(name) for name in suite or suite_files()]
+    suites = [load_suite(name) for name in suite or ()]
     names = [find_scenario(item).name for each in suites for item in each.scenarios]
     rows = read_rows(results, tuple(names) if suite else ())
     if rows.empty:
@@ -69,7 +69,8 @@ def leaderboard(
     for name in target or ():
         if name not in known:
             raise unknown("target", name, known)
-    targets = set(target or (name for each in suites for name in each.targets)) & known
+    named = known & set(target or (name for each in suites for name in each.targets))
+    targets = named or usual_targets(rows)
     relative = read_timings(timings) if timings else None
     current, boards = build(rows, relative, confidence, targets)
     for path in write(out or results, current, boards):

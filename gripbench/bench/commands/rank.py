@@ -18,7 +18,8 @@ def register(app: typer.Typer) -> None:
 def rank(
     results: Annotated[Path, typer.Option(help="Folder of the stored rows.")] = DEFAULT_RESULTS,
     target: Annotated[
-        list[str] | None, typer.Option(help="Signal to rank by; repeat for more. All by default.")
+        list[str] | None,
+        typer.Option(help="Signal to rank by; repeat for more. By default the suites' targets."),
     ] = None,
     sensors: Annotated[
         str,
@@ -45,6 +46,7 @@ def rank(
 ) -> None:
     """Rank the methods of stored rows with the confidence that their runs allow."""
     from gripbench.bench.board_tables import board_table, wins_table
+    from gripbench.bench.leaderboard import usual_targets
     from gripbench.bench.ranking import boards
     from gripbench.bench.store import read_rows
     from gripbench.bench.tables import show
@@ -55,7 +57,7 @@ def rank(
         raise InputError(f"{results}: no stored rows to rank; 'gripbench run' makes them")
     found = boards(
         rows,
-        target or (),
+        target or usual_targets(rows),
         sensors,
         scenarios=scenario or (),
         labels=method or (),
