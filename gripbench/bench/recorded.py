@@ -20,7 +20,9 @@ from gripbench.bench.execution import SkippedError, execute, missing
 from gripbench.bench.registry import MethodSpec, built_in_methods, choose_method
 from gripbench.bench.scoring import DivergedError, score, targets_of
 from gripbench.bench.yardsticks import YARDSTICKS
+from gripbench.envs.logs.importing import ImportedLog
 from gripbench.envs.logs.published import AbsentDataError, load_recording
+from gripbench.envs.logs.storing import load
 from gripbench.envs.recordings import Recording
 from gripbench.errors import GripbenchError
 
@@ -77,15 +79,33 @@ class RecordedScore:
     samples: int = 0
 
 
+def published_methods(imported: ImportedLog, methods: Sequence[str] = ()) -> list[MethodSpec]:
+    """Return methods with the settings that a recording's map has for them.
+
+    Parameters
+    ----------
+    imported
+        The recording.
+    methods
+        Choices of methods, `name[:variant]`; by default every built-in.
+    """
+    settings = imported.provenance.channel_map.get("settings", {})
+    return [
+        choose_method(method, parameters=settings.get(method.partition(":")[0], {}))
+        for method in methods or list(built_in_methods())
+    ]
+
+
 def score_published(
     names: Iterable[str], methods: Sequence[str] = (), folder: Path | None = None
 ) -> list[RecordedScore]:
-    """Score methods and yardsticks on published recordings.
+    """Score methods and yardsticks on published or imported recordings.
 
     Parameters
     ----------
     names
-        Names of recordings; one whose files are absent gives one row that says so.
+        Names of published recordings, one whose files are absent gives one row that says so; or
+        folders that `gripbench import` has written.
     methods
         Choices of methods, `name[:variant]`; by default every built-in. Those that the
         recording's map has settings for get them.
@@ -95,15 +115,11 @@ def score_published(
     scores: list[RecordedScore] = []
     for name in names:
         try:
-            imported = load_recording(name, folder)
+            imported = load(Path(name)) if Path(name).is_dir() else load_recording(name, folder)
         except AbsentDataError as error:
             scores.append(RecordedScore(name, "", "", "", "skipped", str(error)))
             continue
-        settings = imported.provenance.channel_map.get("settings", {})
-        chosen = [
-            choose_method(method, parameters=settings.get(method.partition(":")[0], {}))
-            for method in methods or list(built_in_methods())
-        ]
+        chosen = published_methods(imported, methods)
         scores += score_recordings(imported.recordings, chosen)
     return scores
 

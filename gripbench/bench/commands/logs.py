@@ -10,6 +10,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from gripbench.bench.figures.recordings import PICTURES, write_pictures
 from gripbench.bench.recorded import RecordedScore, score_published
 from gripbench.bench.tables import Column, show
 from gripbench.bench.tables import Table as Table_
@@ -88,7 +89,10 @@ def path(
 
 def recordings(
     names: Annotated[
-        list[str] | None, typer.Argument(help="Published recordings; by default all.")
+        list[str] | None,
+        typer.Argument(
+            help="Published recordings, or folders of imported ones; by default all published."
+        ),
     ] = None,
     method: Annotated[
         list[str] | None,
@@ -97,15 +101,22 @@ def recordings(
     data: Annotated[
         Path | None, typer.Option(help="Folder of the files instead of the one that is set.")
     ] = None,
+    figures: Annotated[
+        Path | None, typer.Option(help="Draw a picture of each recording into this folder.")
+    ] = None,
     format: Annotated[
         str, typer.Option(help="terminal, plain, markdown, csv, latex or html.")
     ] = "terminal",
 ) -> None:
-    """Score methods and trivial estimators on published recordings of real vehicles."""
+    """Score methods and trivial estimators on recordings of real vehicles."""
     scores = score_published(names or recording_files(), method or (), data)
     scored = [score for score in scores if score.status == "ok"]
     if scored:
         show(_table(scored), format)
+    if figures is not None:
+        drawn = sorted({score.recording for score in scored} & set(PICTURES))
+        for path in write_pictures(drawn, figures, data):
+            print(f"drawn: {path}", file=sys.stderr)
     left_out = {(score.estimator, score.reason): None for score in scores if score.status != "ok"}
     for estimator, reason in left_out:
         print(f"no figure: {estimator or 'recording'}: {reason}", file=sys.stderr)
