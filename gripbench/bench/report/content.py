@@ -75,7 +75,8 @@ def chosen_targets(rows: pd.DataFrame, suites: Sequence[str] = ()) -> tuple[str,
     targets = [name for name in wanted if name in present]
     if targets:
         return tuple(targets)
-    shared = [name for name in present if rows[rows["target"] == name]["label"].nunique() > 1]
+    ran = rows[rows["status"] != "skipped"]
+    shared = [name for name in present if ran[ran["target"] == name]["label"].nunique() > 1]
     return tuple(shared or present)
 
 
