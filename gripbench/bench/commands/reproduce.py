@@ -10,7 +10,7 @@ import typer
 from rich.progress import Progress
 
 from gripbench.bench import paper_tables, tables
-from gripbench.bench.claims import Claim, paper_files
+from gripbench.bench.claims import Claim, changed_verdicts, load_paper, paper_files
 from gripbench.bench.manifest import manifest, write_manifest
 from gripbench.configuration import read_toml
 from gripbench.envs.worlds import load_scenario
@@ -192,7 +192,7 @@ def _reproduce_claims(name: str, directory: Path) -> list[str]:
     _write(directory, {"claims": table}, lines)
     files = paper_files()
     write_manifest(directory, manifest({"paper": read_toml(files[name])}, {}))
-    return []
+    return changed_verdicts(load_paper(name), claims)
 
 
 def _range(claim: Claim) -> str:
