@@ -1,0 +1,108 @@
+"""`gripbench publish`: everything that `results/` holds, made by one command."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gripbench.bench.store import DEFAULT_RESULTS
+
+SEEDS = 20
+"""Seeds of a published suite."""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("publish")(publish)
+
+
+def publish(
+    results: Annotated[Path, typer.Option(help="Folder to publish into.")] = DEFAULT_RESULTS,
+    seeds: Annotated[int, typer.Option(min=2, help="Seeds of each scenario.")] = SEEDS,
+    suite: Annotated[
+        list[str] | None, typer.Option(help="Only this suite; repeat for more.")
+    ] = None,
+    paper: Annotated[
+        list[str] | None, typer.Option(help="Only this paper; repeat for more.")
+    ] = None,
+    workers: Annotated[int, typer.Option(min=0, help="Processes; 0: one a core.")] = 0,
+) -> None:
+    """Run the suites, reproduce the papers; write tables, figures, leaderboard, report, manifest.
+
+    Rows that are stored are not run again. Exit code 1 when a published figure has changed.
+    """
+    import joblib
+
+    from gripbench.bench.api import limits_of, plan_of
+    from gripbench.bench.backends import Backend
+    from gripbench.bench.claims import paper_files
+    from gripbench.bench.leaderboard import build, write
+    from gripbench.bench.manifest import manifest, write_manifest
+    from gripbench.bench.registry import load_suite, suite_files
+    from gripbench.bench.report.content import chosen_targets, rows_of_suites
+    from gripbench.bench.report.page import write_report
+    from gripbench.bench.runner import run_plan
+    from gripbench.bench.statistics import CONFIDENCE
+    from gripbench.bench.store import Store, read_rows
+    from gripbench.errors import unknown
+
+    suites, papers = suite or list(suite_files()), paper or list(paper_files())
+    for name in papers:
+        if name not in paper_files():
+            raise unknown("paper", name, paper_files())
+    backend = Backend(workers=workers)
+    began = time.perf_counter()
+
+    def say(text: str) -> None:
+        typer.echo(f"{time.perf_counter() - began:6.1f} s  {text}", err=True)
+
+    for name in suites:
+        run = run_plan(
+            plan_of(name, (), (), seeds), Store(results), backend, limits_of(60.0, 2048.0)
+        )
+        say(f"suite {name}: {run.computed} cells run, {run.stored} stored already")
+    jobs = (joblib.delayed(publish_paper)(name, results) for name in papers)
+    changed: list[str] = []
+    for name, lines in joblib.Parallel(n_jobs=backend.processes, return_as="generator")(jobs):
+        changed += [f"{name}: {line}" for line in lines]
+        say(f"paper {name}")
+    rows = rows_of_suites(read_rows(results), suites)
+    rows = rows[rows["seed"] < seeds]
+    targets = chosen_targets(rows, suites)
+    write(results, *build(rows, None, CONFIDENCE, targets))
+    say("leaderboard")
+    configuration = {name: load_suite(name).model_dump(mode="json") for name in suites}
+    write_manifest(results, manifest(configuration, dict.fromkeys(suites, seeds)))
+    write_report(results, results / "report.html", suites, workers=backend.processes)
+    say("report")
+    for line in changed:
+        typer.echo(f"changed: {line}", err=True)
+    if changed:
+        raise typer.Exit(1)
+
+
+def publish_paper(name: str, results: Path) -> tuple[str, list[str]]:
+    """Reproduce a paper and draw its figures.
+
+    Returns
+    -------
+    The paper's name, and a line for each figure that has left the tolerance stored beside it.
+    """
+    from gripbench.bench.commands.reproduce import reproduce
+    from gripbench.bench.figures.catalogue import write_figures
+
+    said = io.StringIO()
+    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+        try:
+            reproduce(name, results)
+        except typer.Exit as left:
+            if not left.exit_code:
+                raise
+    write_figures(name, results / name / "figures")
+    lines = said.getvalue().splitlines()
+    return name, [line.removeprefix("changed: ") for line in lines if line.startswith("changed: ")]
