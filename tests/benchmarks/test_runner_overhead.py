@@ -1,6 +1,6 @@
 """What the runner costs beside the work that it runs, and a run in which nothing is left to do.
 
-pytest tests/benchmarks/test_runner.py -n 0 --benchmark-enable -s
+pytest tests/benchmarks/test_runner_overhead.py -n 0 --benchmark-enable -s
 """
 
 import time
