@@ -216,7 +216,7 @@ def test_every_built_in_method_passes(name):
 
 def test_an_expected_failure_is_told_with_its_reason():
     class Declared(NegativeVariance):
-        expected_failures = {"variance_not_negative": "shows what goes wrong"}  # noqa: RUF012
+        expected_failures = {"variance_not_negative": "shows what goes wrong"}
 
     results = check_estimator(Declared, SCENARIO, checks=["variance_not_negative"])
     assert results["variance_not_negative"] == EXPECTED + "shows what goes wrong"
@@ -225,7 +225,7 @@ def test_an_expected_failure_is_told_with_its_reason():
 
 def test_an_expected_failure_that_passes_is_a_failure():
     class Declared(Sound):
-        expected_failures = {"causal": "it is not, really"}  # noqa: RUF012
+        expected_failures = {"causal": "it is not, really"}
 
     found = check_estimator(Declared, SCENARIO, checks=["causal"])["causal"]
     assert "remove 'causal' from 'expected_failures'" in found
@@ -233,7 +233,7 @@ def test_an_expected_failure_that_passes_is_a_failure():
 
 def test_an_expected_failure_of_no_check_is_a_failure():
     class Declared(Sound):
-        expected_failures = {"causl": "misspelt"}  # noqa: RUF012
+        expected_failures = {"causl": "misspelt"}
 
     results = check_estimator(Declared, SCENARIO, checks=["causal"])
     assert "did you mean 'causal'" in results["declares_its_channels"]

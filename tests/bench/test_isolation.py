@@ -15,7 +15,7 @@ from gripbench.errors import InputError
 FAULTS = {
     "Sound": ("ok", ""),
     "Raises": ("failed", "ValueError: no luck (in fault, faulty.py:"),
-    "Hangs": ("timeout", "stopped after the time limit of 2 s"),
+    "Hangs": ("timeout", "stopped after the time limit of 6 s"),
     "Exits": ("failed", "its process exited with code 0"),
     "Leaves": ("failed", "SystemExit: 3"),
     "Crashes": ("failed", "its process was killed by SIGSEGV"),
@@ -41,7 +41,7 @@ def faulty_rows(tmp_path_factory, plugins):
         methods=["slip_slope", *(f"{plugins}/faulty.py:{name}" for name in FAULTS)],
         results=folder,
         workers=1,
-        time_limit=2.0,
+        time_limit=6.0,
         memory_limit=600,
     )
 
