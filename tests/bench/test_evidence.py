@@ -55,3 +55,10 @@ def test_true_speed_closes_the_open_cell_and_opens_others(rows):
     row = _row(rows, "slip of the observer")
     assert row["V_matches"] == 30
     assert row["IV_matches"] < 30
+
+
+def test_other_gains_close_the_open_cell_at_the_cost_of_the_forces(rows):
+    row, usual = _row(rows, "gains of the observer"), _row(rows, "none")
+    assert row["V_matches"] == 30
+    assert row["IV_mean"] > usual["IV_mean"]
+    assert row["V_mean"] < usual["V_mean"]

@@ -295,7 +295,16 @@ def changes(seeds: int) -> tuple[Change, ...]:
             figure=noisy(normalised=0.0),
         ),
         Change(
-            "settings", "slip of the observer", "true speed, all rows",
+            "open cell", "gradient, friction", "as reproduced",
+            figure=lambda _: figures.early_error(_named("li2014_gradient", 0)),
+        ),
+        Change(
+            "open cell", "gains of the observer", "K_a 1.5e6, K_e 5e4",
+            chooser=_with(observer, "", False, velocity_gain=1.5e6, stiffness_gain=5e4),
+            figure=_ratios,
+        ),
+        Change(
+            "open cell", "slip of the observer", "true speed, all rows",
             chooser=_with(
                 observer, "paper_noise", False, stiffness_gain=8e4, normalised=0.0
             ),

@@ -186,3 +186,17 @@ def solver_error(run: Recording) -> str:
     held = (run.truth["time"] > 1.5) & (run.truth["time"] < 19.9)
     error = (run.truth["force_x_front"] - force)[held]
     return f"the solver's front force is off by {np.mean(error):.0f} +/- {np.std(error):.0f} N"
+
+
+def early_error(run: Recording) -> str:
+    """Return how much of the proposed observer's friction error lies in the first half second."""
+    estimates = ProposedObserver("paper").run(run.vehicle, run.observations)
+    early = run.truth["time"] < 0.5
+    squares = np.square(estimates["mu_front"] - run.truth["mu_front"])
+    speed = estimates["speed_x"] - run.truth["speed_x"]
+    slip_speed = run.vehicle["wheel_radius"] * run.truth["wheel_speed_front"] - run.truth["speed_x"]
+    return (
+        f"{100.0 * np.sum(squares[early]) / np.sum(squares):.0f} % of the squared error lies in "
+        f"the first 0.5 s: velocity off by {np.mean(speed[early]):.5f} m/s at a slip speed of "
+        f"{np.mean(slip_speed[early]):.5f} m/s"
+    )
