@@ -254,6 +254,9 @@ def _rows(
         raise InputError(f"{path}: key '{channel_map.rows or 'channels'}': only {len(rows)} sample")
     dropped = {}
     for name, series in channels.items():
+        if np.array_equal(series.times, rows):
+            dropped[name] = 0
+            continue
         inside = series.times[(series.times >= first) & (series.times <= rows[-1])]
         dropped[name] = int((np.diff(np.searchsorted(rows, inside)) == 0).sum())
     return rows, dropped
@@ -279,7 +282,10 @@ def _held(channels: dict[str, Series], rows: Floats, origin: float) -> npt.NDArr
     observations = np.empty(len(rows), record_type(["time", *names, *extra, *flags]))
     observations["time"] = rows - origin
     for name, series in channels.items():
-        at = np.searchsorted(series.times, rows, side="right") - 1
+        if np.array_equal(series.times, rows):
+            at = np.arange(len(rows))
+        else:
+            at = np.searchsorted(series.times, rows, side="right") - 1
         values = series.values - origin if name == "gps_time" else series.values
         observations[name] = values[at]
         observations[name + NEW] = np.append(True, np.diff(at) > 0)
