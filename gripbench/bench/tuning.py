@@ -19,7 +19,7 @@ from gripbench.bench.recorded import score_recordings
 from gripbench.bench.registry import built_in_methods, choose_method
 from gripbench.envs.logs.published import load_recording
 from gripbench.envs.recordings import Recording
-from gripbench.errors import InputError
+from gripbench.errors import InputError, unknown
 
 NOISE_LEVELS = ("_noise", "_walk", "_std", "_density")
 """Endings of the parameters that are noise levels."""
@@ -90,9 +90,12 @@ def tune(
         raise InputError(f"{recordings[0].scenario}: has no window 'train' to tune on")
     known = dict(fixed or {})
     name = method.partition(":")[0]
+    methods = built_in_methods()
+    if name not in methods:
+        raise unknown("method", name, methods)
     levels = {
         parameter.name: parameter
-        for parameter in built_in_methods()[name].parameters
+        for parameter in methods[name].parameters
         if parameter.name.endswith(NOISE_LEVELS)
         and parameter.default > 0.0
         and parameter.name not in known
@@ -147,10 +150,18 @@ def _figure(
     method: str, recordings: Sequence[Recording], target: str, settings: dict[str, Any]
 ) -> float:
     spec = choose_method(method, parameters=settings)
+    scored: list[str] = []
     for row in score_recordings(recordings, [spec]):
         if row.kind == "method":
             if row.status == "skipped":
                 raise InputError(f"{method}: {row.reason}")
             if row.target == target and row.value is not None:
                 return row.value if row.outside is None else row.outside
+            if row.status == "ok":
+                scored.append(row.target)
+    if scored:
+        raise InputError(
+            f"{method}: nothing is known of '{target}' on the training windows; "
+            f"scored are {', '.join(scored)}"
+        )
     return float("inf")

@@ -121,6 +121,13 @@ def test_tuning_without_a_training_window_is_refused():
         tune("kinematic_kalman_filter", [_turning(windows={"test": ((0.0, 60.0),)})], "yaw")
 
 
+def test_tuning_names_what_it_cannot_do():
+    with pytest.raises(InputError, match="unknown method 'kinematic'"):
+        tune("kinematic", [_turning()], "yaw")
+    with pytest.raises(InputError, match=r"nothing is known of 'mu'.*sideslip, yaw"):
+        tune("kinematic_kalman_filter", [_turning()], "mu", draws=1)
+
+
 def test_absent_data_is_one_row(tmp_path):
     (row,) = score_published(["f1tenth_optitrack"], [], tmp_path)
     assert row.status == "skipped"
