@@ -60,7 +60,7 @@ def _method(step):
         estimates = ("force_x_front",)
         vehicle_parameters = ("mass",)
         parameters = (Parameter("share", 0.5, "-", "Share", 0.0, 1.0),)
-        variants = {"whole": {"share": 1.0}}  # noqa: RUF012
+        variants = {"whole": {"share": 1.0}}
         state = STATE
 
     Toy.step = staticmethod(step)
