@@ -1,0 +1,51 @@
+"""Hooks of the site: a generated page, links into the repository, formulas."""
+
+from __future__ import annotations
+
+import posixpath
+import re
+from html import unescape
+from pathlib import Path
+from typing import Any
+
+from latex2mathml.converter import convert
+from mkdocs.structure.files import File, Files
+
+from gripbench.bench.method_pages import catalogue_page
+
+ROOT = Path(__file__).parents[2]
+_LINK = re.compile(r"(?<!!)\[([^\]]*)\]\((\.\./[^)\s]+)\)")
+_FORMULA = re.compile(r'<(span|div) class="arithmatex">\\([(\[])(.*?)\\[)\]]</\1>', re.DOTALL)
+
+
+def on_files(files: Files, config: Any) -> Files:
+    """Add the catalogue of methods, made from the code and the published leaderboard."""
+    text = catalogue_page(ROOT / "results")
+    files.append(File.generated(config, "methods.md", content=text))
+    return files
+
+
+def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
+    """Show the path of a file of the repository where a page links to it: it is not on the site.
+
+    A link to a file that does not exist stays, so that the strict build names it.
+    """
+
+    def shown(link: re.Match[str]) -> str:
+        here = posixpath.dirname(f"docs/{page.file.src_uri}")
+        path = posixpath.normpath(posixpath.join(here, link[2].partition("#")[0]))
+        if path.startswith("docs/") or not (ROOT / path).exists():
+            return link[0]
+        return f"{link[1]} (`{path}`)" if link[1].strip("`") != path else f"`{path}`"
+
+    return _LINK.sub(shown, markdown)
+
+
+def on_page_content(html: str, **_: Any) -> str:
+    """Turn formulas into MathML, which browsers show without a script."""
+    return _FORMULA.sub(
+        lambda found: convert(
+            unescape(found[3]).strip(), display="inline" if found[2] == "(" else "block"
+        ),
+        html,
+    )

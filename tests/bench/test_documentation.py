@@ -1,0 +1,92 @@
+"""What the pages of the documentation show runs as it stands there."""
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from gripbench.bench import leaderboard, method_pages
+from gripbench.bench.registry import built_in_methods
+
+ROOT = Path(__file__).parents[2]
+PAGES = ("index", "add-a-method", "add-a-scenario", "add-a-vehicle", "contract", "figures")
+BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+FILE = re.compile(r"# (\S+\.(?:py|toml))\n")
+
+
+def blocks(page):
+    return BLOCK.findall((ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8"))
+
+
+def script(page):
+    """Return a program that does what the blocks of a page do, one after the other."""
+    lines = ["from typer.testing import CliRunner", "from pathlib import Path"]
+    lines += ["from gripbench.bench.command_line import application", "app = application()"]
+    for language, text in blocks(page):
+        named = FILE.match(text)
+        if named:
+            lines.append(f"Path({named[1]!r}).write_text({text!r}, encoding='utf-8')")
+        elif language == "python":
+            lines.append(text)
+        elif language == "console":
+            for call in text.splitlines():
+                words = shlex.split(call)[1:]
+                lines.append(f"done = CliRunner().invoke(app, {words!r}, catch_exceptions=False)")
+                lines.append(f"assert done.exit_code == 0, ({call!r}, done.output)")
+    return "\n".join(lines)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_the_blocks_of_a_page_run(page, tmp_path):
+    assert blocks(page)
+    program = tmp_path / "page.py"
+    program.write_text(script(page), encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, program.name], cwd=tmp_path, capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 0, done.stderr[-3000:]
+
+
+def test_every_method_is_in_the_catalogue_with_its_reference(tmp_path):
+    text = method_pages.catalogue_page(tmp_path).replace("\\", "")
+    for name, method in built_in_methods().items():
+        assert f"`{name}`. {method.reference}".removesuffix(".") in text
+        assert f"## {method.title}" in text
+        for parameter in method.parameters:
+            assert f"| {parameter.unit} | {parameter.description} |" in text
+    assert "no results are published" in text
+
+
+def runs(label, rms, scenario="step", failed=None):
+    return leaderboard.Runs(
+        scenario=scenario, target="mu", label=label, seeds=(0,), sums_of_squares=(rms**2,),
+        counts=(1,), failed=failed or {},
+    )  # fmt: skip
+
+
+def published(*found):
+    return leaderboard.Leaderboard(
+        gripbench="0", confidence=0.95, boards=(), runtimes={}, runs=found
+    )
+
+
+def test_a_method_fails_where_it_is_three_times_worse_than_the_best():
+    board = published(runs("best", 0.1), runs("poor", 0.31), runs("fair", 0.29))
+    assert method_pages.failures_of("fair", board) == []
+    assert method_pages.failures_of("best", board) == []
+    assert method_pages.failures_of("poor", board) == [
+        "`mu` in step: RMS 0.310, 3.1 times the best"
+    ]
+
+
+def test_a_method_fails_where_runs_failed_but_not_where_they_were_skipped():
+    broken = runs("broken", 0.1, failed={1: "failed: ValueError"})
+    skipped = runs("skipped", 0.1, failed={1: "skipped: no sensor"})
+    board = published(broken, skipped)
+    assert method_pages.failures_of("broken", board) == [
+        "`mu` in step: 1 of 2 runs failed (failed: ValueError)"
+    ]
+    assert method_pages.failures_of("skipped", board) == []
