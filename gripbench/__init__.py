@@ -1,7 +1,8 @@
 """gripbench: a benchmark of estimators of tyre-road friction and vehicle sideslip.
 
 The names below are the stable Python interface; everything else may move between versions. They
-are imported when first used, so that `import gripbench` costs nothing.
+are imported when first used, so that `import gripbench` costs little; it registers the scenarios
+as Gymnasium environments.
 
 Examples
 --------
@@ -19,6 +20,8 @@ import importlib
 import os
 import sys
 from typing import TYPE_CHECKING, Any
+
+from gripbench.envs.registration import register_environments
 
 if TYPE_CHECKING:
     from gripbench.bench.api import run
@@ -81,3 +84,6 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return sorted([*globals(), *DEFINED_IN])
+
+
+register_environments()

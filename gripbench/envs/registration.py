@@ -1,22 +1,27 @@
-"""Gymnasium ids of the scenarios, registered when Gymnasium or gripbench is imported."""
+"""Gymnasium ids of the scenarios; `import gripbench` registers them, as Gymnasium's users expect.
+
+This module imports little, because everybody who imports gripbench imports it.
+"""
 
 from __future__ import annotations
 
-import tomllib
+import re
+from pathlib import Path
 
 import gymnasium
 
-from gripbench.envs.worlds import scenario_files
+_SCENARIOS = Path(__file__).parent.parent / "configs" / "scenarios"
+_IDENTITY = re.compile(r'^environment = "(gripbench/[^"]+)"', re.MULTILINE)
 
 
 def register_environments() -> None:
     """Register the versioned id of every scenario that ships and can be stepped."""
-    for name, path in scenario_files().items():
-        identity = tomllib.loads(path.read_text(encoding="utf-8")).get("environment")
-        if identity and identity not in gymnasium.registry:
+    for path in sorted(_SCENARIOS.glob("*.toml")):
+        found = _IDENTITY.search(path.read_text(encoding="utf-8"))
+        if found and found.group(1) not in gymnasium.registry:
             gymnasium.register(
-                id=identity,
+                id=found.group(1),
                 entry_point="gripbench.envs.environment:VehicleEnvironment",
                 vector_entry_point="gripbench.envs.vector_environment:VehicleVectorEnvironment",
-                kwargs={"scenario": name},
+                kwargs={"scenario": path.stem},
             )

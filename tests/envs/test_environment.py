@@ -6,10 +6,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from gripbench.envs.environment import VehicleEnvironment
-from gripbench.envs.registration import register_environments
 from gripbench.envs.worlds import load_scenario, record, scenario_files, simulation_of
-
-register_environments()
 
 STEPPED = [name for name in scenario_files() if load_scenario(name).environment]
 ONE_OF_EACH_WORLD = ["noisy_acceleration", "double_lane_change_snow"]
@@ -30,6 +27,10 @@ def test_registered_environment_passes_the_checker(name):
 def test_ids_are_unique():
     identities = [load_scenario(name).environment for name in STEPPED]
     assert len(set(identities)) == len(identities)
+
+
+def test_every_id_is_registered_by_importing_the_package():
+    assert all(load_scenario(name).environment in gymnasium.registry for name in STEPPED)
 
 
 def test_paper_solver_has_no_environment():
