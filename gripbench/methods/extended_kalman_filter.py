@@ -144,9 +144,7 @@ def _step(state, obs, accel_x, params, est):  # type: ignore[no-untyped-def]
         advance(kalman, obs.torque_front, obs.torque_rear, elapsed, params)
     state.time = obs.time
     state.samples += 1.0
-    measure(
-        kalman, accel_x, obs.wheel_speed_front, obs.wheel_speed_rear, obs.speed_gps, params
-    )
+    measure(kalman, accel_x, obs.wheel_speed_front, obs.wheel_speed_rear, obs.speed_gps, params)
     _finish(state, obs, elapsed, params, est)
 
 

@@ -35,9 +35,7 @@ from gripbench.methods.rls import (
     slip_regressor,
 )
 
-STATE = np.dtype(
-    [(name, np.float64) for name in ("time", "samples", "slope", "covariance", "mu")]
-)
+STATE = np.dtype([(name, np.float64) for name in ("time", "samples", "slope", "covariance", "mu")])
 
 
 @compiled
