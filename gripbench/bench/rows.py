@@ -19,7 +19,7 @@ from gripbench.errors import InputError
 if TYPE_CHECKING:
     import pandas as pd
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 """Version of the stored form; rows of every earlier version still load (see `_MIGRATIONS`)."""
 
 Status = Literal["ok", "failed", "timeout", "diverged", "skipped"]
@@ -45,6 +45,30 @@ class Stratum(Configuration):
         return math.sqrt(self.sum_of_squares / self.count) if self.count else None
 
 
+class FrictionResponse(Configuration):
+    """How an estimate of the available friction answers lateral excitation.
+
+    `gripbench.bench.friction_response` defines excitation and delay.
+
+    Attributes
+    ----------
+    sum_of_squares, count
+        Squared errors and samples from the first excitation on.
+    delay
+        Time [s] from the first excitation until the estimate has settled; None: it never does.
+    jumped
+        Whether the friction jumps in this run.
+    jump_delay
+        Time [s] from the jump until the estimate has settled again; None: it never does.
+    """
+
+    sum_of_squares: float
+    count: int
+    delay: float | None = None
+    jumped: bool = False
+    jump_delay: float | None = None
+
+
 class TargetScore(Configuration):
     """Scores of one estimated signal over the scored samples of one run.
 
@@ -67,6 +91,8 @@ class TargetScore(Configuration):
     mean_nees
         Mean of squared error over the method's own variance, 1 for a consistent filter; None
         where the method gives no variance, or one that is not positive.
+    friction
+        For the available friction, its response to excitation; None where there is none.
     """
 
     rms: float
@@ -77,6 +103,7 @@ class TargetScore(Configuration):
     convergence_time: float | None = None
     by_utilisation: dict[str, Stratum] = Field(default_factory=dict)
     mean_nees: float | None = None
+    friction: FrictionResponse | None = None
 
 
 class Runtime(Configuration):
@@ -147,7 +174,9 @@ class Row(Configuration):
     versions: dict[str, str] = Field(default_factory=dict)
 
 
-_MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {}
+_MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {
+    1: lambda content: {**content, "schema_version": 2},  # 2 added the response of the friction
+}
 """For each earlier version, the function that turns its content into the next version's."""
 
 
@@ -179,9 +208,11 @@ def frame_of(rows: Iterable[Row]) -> pd.DataFrame:
     A row that is not `ok` has a line with NaN scores for each of its targets, so that no failure
     vanishes from a table made of the frame. Columns: `scenario, seed, label, method, variant,
     title, target, status, reason, rms, sum_of_squares, count, peak, bias, convergence_time,
-    mean_nees, rms_<band>, sum_of_squares_<band>, count_<band>` for each utilisation band,
-    `sample_period, step_batch, step_p50, step_p99, step_max, deadline_misses, sensors, idealised,
-    parameters, key`.
+    mean_nees, excited_sum_of_squares, excited_count, friction_delay, jump_delay, rms_<band>,
+    sum_of_squares_<band>, count_<band>` for each utilisation band, `sample_period, step_batch,
+    step_p50, step_p99, step_max, deadline_misses, sensors, idealised, parameters, key`. Delays of
+    the friction are inf where it never settles, and NaN where nothing excites it or it does not
+    jump.
     """
     import pandas as pd  # half a second that a worker process need not spend
 
@@ -228,8 +259,10 @@ def _common_columns(row: Row) -> dict[str, Any]:
 _PLAIN_SCORES = (
     "rms", "sum_of_squares", "count", "peak", "bias", "convergence_time", "mean_nees",
 )  # fmt: skip
+_FRICTION_SCORES = ("excited_sum_of_squares", "excited_count", "friction_delay", "jump_delay")
 _SCORE_COLUMNS = (
     *_PLAIN_SCORES,
+    *_FRICTION_SCORES,
     *(f"{kind}_{band}" for band, _, _ in UTILISATION_BANDS
       for kind in ("rms", "sum_of_squares", "count")),
 )  # fmt: skip
@@ -239,6 +272,14 @@ def _score_columns(score: TargetScore | None) -> dict[str, float | None]:
     if score is None:
         return {**dict.fromkeys(_SCORE_COLUMNS, math.nan), "count": 0}
     columns: dict[str, float | None] = {name: getattr(score, name) for name in _PLAIN_SCORES}
+    if score.friction is not None:
+        friction = score.friction
+        columns["excited_sum_of_squares"] = friction.sum_of_squares
+        columns["excited_count"] = friction.count
+        columns["friction_delay"] = math.inf if friction.delay is None else friction.delay
+        if friction.jumped:
+            late = friction.jump_delay
+            columns["jump_delay"] = math.inf if late is None else late
     for band, stratum in score.by_utilisation.items():
         columns[f"rms_{band}"] = stratum.rms
         columns[f"sum_of_squares_{band}"] = stratum.sum_of_squares

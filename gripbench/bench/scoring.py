@@ -8,6 +8,8 @@ Convergence time
     Time [s] from the start of scoring, or from the recording's note `friction_step` if that is
     later, to the first sample from which the absolute error stays within `BAND` of the largest
     absolute truth for `HOLD` seconds.
+Response of the friction
+    See `gripbench.bench.friction_response`.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
+from gripbench.bench.friction_response import friction_response, is_available_friction
 from gripbench.bench.rows import UTILISATION_BANDS, Stratum, TargetScore
 from gripbench.envs.recordings import Recording
 from gripbench.envs.signals import VARIANCE
@@ -100,6 +103,16 @@ def score(
         scored = _score_of(sums)
         if scored is None:
             raise DivergedError(f"{name} is too large to be squared")
+        if scored.count and is_available_friction(name) and "accel_y" in known:
+            response = friction_response(
+                times,
+                _column(estimates, name),
+                _column(truth, name),
+                _column(truth, "accel_y"),
+                recording.score_from,
+                recording.notes.get("mu_jump_time", math.nan),
+            )
+            scored = scored.model_copy(update={"friction": response})
         if scored.count:
             scores[name] = scored
     return scores

@@ -32,6 +32,10 @@ def summary(rows: pd.DataFrame) -> pd.DataFrame:
     Frame with the columns `scenario, target, label, idealised, runs, ok, status, rms, low, high`:
     `rms` is pooled over the runs that are `ok` by the mean of squares, `low` and `high` bound its
     95 % interval (percentile bootstrap over runs, never over samples), `status` counts the others.
+    For the available friction also, over the runs that are excited, `excited, excited_rms,
+    excited_low, excited_high` (number of these runs, RMS from the first excitation on), `settled,
+    delay, delay_low, delay_high` (number of runs that settle, mean of their delays [s]) and, where
+    the friction jumps, `jumps, jump_settled, jump_delay, jump_low, jump_high` alike.
     """
     lines: list[dict[str, Any]] = []
     for (scenario, target, label), group in rows.groupby(
@@ -54,12 +58,52 @@ def summary(rows: pd.DataFrame) -> pd.DataFrame:
                 "rms": pooled_rms(squares, counts),
                 "low": low,
                 "high": high,
+                **_friction(good),
             }
         )
     columns = (
         "scenario", "target", "label", "idealised", "runs", "ok", "status", "rms", "low", "high",
+        "excited", "excited_rms", "excited_low", "excited_high",
+        "settled", "delay", "delay_low", "delay_high",
+        "jumps", "jump_settled", "jump_delay", "jump_low", "jump_high",
     )  # fmt: skip
     return pd.DataFrame(lines, columns=list(columns))
+
+
+def _friction(good: pd.DataFrame) -> dict[str, Any]:
+    """Return what a summary says of the response of the friction, of runs that are `ok`."""
+    if "friction_delay" not in good:
+        return {}
+    excited = good[good["friction_delay"].notna()]
+    squares = excited["excited_sum_of_squares"].to_numpy(float)
+    counts = excited["excited_count"].to_numpy(float)
+    low, high = interval(squares, counts)
+    found: dict[str, Any] = {
+        "excited": len(excited),
+        "excited_rms": pooled_rms(squares, counts),
+        "excited_low": low,
+        "excited_high": high,
+    }
+    delays = excited["friction_delay"].to_numpy(float)
+    found["settled"], *mean = _mean_of_settled(delays)
+    found |= dict(zip(("delay", "delay_low", "delay_high"), mean, strict=True))
+    jumped = good.loc[good["jump_delay"].notna(), "jump_delay"].to_numpy(float)
+    found["jumps"] = len(jumped)
+    found["jump_settled"], *mean = _mean_of_settled(jumped)
+    return found | dict(zip(("jump_delay", "jump_low", "jump_high"), mean, strict=True))
+
+
+def _mean_of_settled(delays: np.ndarray) -> tuple[int, float, float, float]:
+    """Return how many delays are finite, their mean and its 95 % interval by bootstrap."""
+    finite = delays[np.isfinite(delays)]
+    if not len(finite):
+        return 0, math.nan, math.nan, math.nan
+    mean = float(finite.mean())
+    if len(finite) < 2:
+        return 1, mean, math.nan, math.nan
+    means = _resampling(len(finite)) @ finite / len(finite)
+    low, high = np.quantile(means, [0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2])
+    return len(finite), mean, float(low), float(high)
 
 
 def interval(squares: np.ndarray, counts: np.ndarray) -> tuple[float, float]:

@@ -70,6 +70,18 @@ def test_rows_of_the_first_schema_version_load():
     failed = read_row(SAMPLES / "version_1_failed.json")
     assert failed is not None
     assert (failed.status, failed.targets) == ("timeout", ("mu_front",))
+    assert row.schema_version == failed.schema_version == rows.SCHEMA_VERSION
+    assert row.scores["mu_front"].friction is None
+
+
+def test_rows_of_the_second_schema_version_load():
+    row = read_row(SAMPLES / "version_2.json")
+    assert row is not None
+    friction = row.scores["mu"].friction
+    assert friction is not None
+    assert friction.jumped
+    assert friction.delay is not None
+    assert friction.count < row.scores["mu"].count
 
 
 def test_an_earlier_version_passes_through_every_step_to_the_present_one(monkeypatch):
@@ -82,7 +94,7 @@ def test_an_earlier_version_passes_through_every_step_to_the_present_one(monkeyp
             2: lambda content: {**content, "label": content["label"] + " three"},
         },
     )
-    content = json.loads(a_row().model_dump_json())
+    content = {**json.loads(a_row().model_dump_json()), "schema_version": 1}
     assert row_from(content, "here").label == "rls:paper@a=1.0 two three"
 
 
