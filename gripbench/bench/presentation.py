@@ -6,6 +6,7 @@ import math
 import sys
 
 import pandas as pd
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
@@ -50,46 +51,143 @@ def significant(value: float, digits: int = 3) -> str:
     return f"{value:.{places}f}" if places <= 6 else f"{value:.{digits - 1}e}"
 
 
-def cell(line: pd.Series) -> str:
-    """Return the text of one line of a summary: RMS, interval, what failed."""
+DEGREES = 180.0 / math.pi
+
+
+def shown_unit(target: str) -> tuple[float, str]:
+    """Return factor and unit in which tables show a signal: angles in degrees, others in SI."""
+    unit = signal(target).unit
+    return (DEGREES, "deg") if unit == "rad" else (1.0, unit)
+
+
+def bounded(value: float, low: float, high: float, factor: float = 1.0) -> str:
+    """Return a figure with its interval where it has one.
+
+    Examples
+    --------
+    >>> bounded(1.0, 0.9, 1.1), bounded(1.0, float("nan"), float("nan"), 2.0)
+    ('1.00 [0.900, 1.10]', '2.00')
+    """
+    text = significant(factor * value)
+    if not math.isfinite(low):
+        return text
+    return f"{text} [{significant(factor * low)}, {significant(factor * high)}]"
+
+
+def cell(line: pd.Series, factor: float = 1.0) -> str:
+    """Return the text of one line of a summary: RMS times a factor, interval, what failed."""
     parts = []
     if line["ok"]:
-        parts.append(significant(line["rms"]))
-        if math.isfinite(line["low"]):
-            parts.append(f"[{significant(line['low'])}, {significant(line['high'])}]")
+        parts.append(bounded(line["rms"], line["low"], line["high"], factor))
     if line["status"]:
         all_one = not line["ok"] and "," not in line["status"]
         parts.append(line["status"].split()[-1] if all_one else f"({line['status']})")
     return " ".join(parts)
 
 
-def rms_tables(summary: pd.DataFrame) -> list[tuple[str, Table]]:
-    """Return a heading and a table for each target: methods down, scenarios across."""
+def rms_tables(summary: pd.DataFrame, width: int) -> list[tuple[str, Table]]:
+    """Return headings and tables of each target.
+
+    Methods down and scenarios across where that fits the width; else, and for a friction with a
+    response to excitation, one line a method in a block for each scenario.
+    """
     tables = []
     for key, part in summary.groupby("target", sort=False):
         target = str(key)
         if not target:
             continue
-        scenarios = list(dict.fromkeys(part["scenario"]))
-        unit = signal(target).unit
+        factor, unit = shown_unit(target)
         runs = int(part["runs"].max())
         heading = f"{target} [{unit}]: RMS error, pooled over {runs} runs, 95 % interval"
-        table = Table()
-        table.add_column("method")
-        for scenario in scenarios:
-            table.add_column(scenario, justify="right")
-        for label, lines in part.groupby("label", sort=False):
-            texts = {line["scenario"]: cell(line) for _, line in lines.iterrows()}
-            name = marked(str(label), lines["idealised"].iloc[0])
-            table.add_row(name, *(texts.get(scenario, "") for scenario in scenarios))
+        responds = bool((part["excited"].fillna(0) > 0).any())
+        table = _across(part, factor)
+        if responds or Console(width=10_000).measure(table).maximum > width:
+            table = _down(part, factor, responds)
+        if responds:
+            heading += "; delay until it stays within 20 %"
         tables.append((heading, table))
+        if (part["jumps"].fillna(0) > 0).any():
+            tables.append(
+                (f"{target}: delay [s] from the jump of the friction, 95 % interval", _jumps(part))
+            )
     return tables
+
+
+def _across(part: pd.DataFrame, factor: float) -> Table:
+    """Return a table with methods down and scenarios across."""
+    scenarios = list(dict.fromkeys(part["scenario"]))
+    table = Table()
+    table.add_column("method", no_wrap=True)
+    for scenario in scenarios:
+        table.add_column(scenario, justify="right", no_wrap=True)
+    for label, lines in part.groupby("label", sort=False):
+        texts = {line["scenario"]: cell(line, factor) for _, line in lines.iterrows()}
+        name = marked(str(label), lines["idealised"].iloc[0])
+        table.add_row(name, *(texts.get(scenario, "") for scenario in scenarios))
+    return table
+
+
+def _down(part: pd.DataFrame, factor: float, responds: bool) -> Table:
+    """Return a table with a block for each scenario; what was skipped altogether is left out."""
+    table = _blocks()
+    table.add_column("scenario, method", no_wrap=True)
+    headings = ("RMS", *(("from excitation", "delay [s]", "settled") if responds else ()))
+    for heading in headings:
+        table.add_column(heading, justify="right")
+    for scenario, lines in part.groupby("scenario", sort=False):
+        shown = [line for _, line in lines.iterrows() if not _skipped(line)]
+        if not shown:
+            continue
+        table.add_section()
+        table.add_row(f"[bold]{scenario}[/bold]")
+        for line in shown:
+            name = marked(line["label"], line["idealised"])
+            more = _response(line, factor) if responds else ()
+            table.add_row(f"  {name}", cell(line, factor), *more)
+    return table
+
+
+def _blocks() -> Table:
+    """Return an empty table without vertical lines: five columns stay within 120 characters."""
+    return Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
+
+
+def _skipped(line: pd.Series) -> bool:
+    return bool(not line["ok"] and line["status"] == f"{line['runs']} skipped")
+
+
+def _response(line: pd.Series, factor: float) -> tuple[str, str, str]:
+    """Return RMS from the first excitation on, delay, and how many of the excited runs settle."""
+    if not line["excited"] > 0:
+        return "not excited", "", ""
+    return (
+        bounded(line["excited_rms"], line["excited_low"], line["excited_high"], factor),
+        bounded(line["delay"], line["delay_low"], line["delay_high"]),
+        f"{line['settled']:.0f}/{line['excited']:.0f}",
+    )
+
+
+def _jumps(part: pd.DataFrame) -> Table:
+    table = _blocks()
+    table.add_column("scenario, method", no_wrap=True)
+    table.add_column("delay [s]", justify="right")
+    table.add_column("settled", justify="right")
+    for scenario, lines in part[part["jumps"].fillna(0) > 0].groupby("scenario", sort=False):
+        table.add_section()
+        table.add_row(f"[bold]{scenario}[/bold]")
+        for _, line in lines.iterrows():
+            table.add_row(
+                f"  {marked(line['label'], line['idealised'])}",
+                bounded(line["jump_delay"], line["jump_low"], line["jump_high"]),
+                f"{line['jump_settled']:.0f}/{line['jumps']:.0f}",
+            )
+    return table
 
 
 def print_summary(summary: pd.DataFrame) -> None:
     """Print the tables of a summary, and what the mark means where it occurs."""
     out = console()
-    for heading, table in rms_tables(summary):
+    for heading, table in rms_tables(summary, out.width):
         out.print(heading, markup=False, soft_wrap=True)
         out.print(table)
     if (summary["idealised"] != "").any():
@@ -97,13 +195,17 @@ def print_summary(summary: pd.DataFrame) -> None:
 
 
 def print_failures(rows: pd.DataFrame) -> None:
-    """Print what is not ok with its reason, skipped cells last."""
+    """Print what is not ok with its reason: failures one by one, then methods that were skipped."""
     bad = failures(rows)
+    skipped = bad["status"] == "skipped"
     out = console()
-    for _, line in bad.sort_values("status", key=lambda column: column == "skipped").iterrows():
+    for _, line in bad[~skipped].iterrows():
         runs = f"{line['runs']} runs" if line["runs"] > 1 else f"seed {line['first_seed']}"
         out.print(
             f"{line['status']}: {line['label']} on {line['scenario']} ({runs}): {line['reason']}",
             markup=False,
             soft_wrap=True,
         )
+    for (label, reason), lines in bad[skipped].groupby(["label", "reason"], sort=False):
+        scenarios = ", ".join(dict.fromkeys(lines["scenario"]))
+        out.print(f"skipped: {label}: {reason}: {scenarios}", markup=False, soft_wrap=True)
