@@ -17,7 +17,6 @@ from typing import Any, Literal, Protocol, Self
 import numpy as np
 import numpy.typing as npt
 from pydantic import Field, model_validator
-from scipy.stats import kendalltau
 
 from gripbench.bench.registry import built_in_methods
 from gripbench.configuration import CONFIGS, Configuration, parse, read_toml
@@ -177,6 +176,8 @@ class Outcome:
 
     def order_agreement(self, label: str, scenario: str) -> float:
         """Return Kendall's tau between our order of the methods and the paper's."""
+        from scipy.stats import kendalltau  # slow to import
+
         row = [cell for cell in self.of_table(label) if cell.scenario == scenario]
         result = kendalltau([c.ours for c in row], [c.published for c in row])
         return float(result.statistic)

@@ -16,8 +16,6 @@ import numba
 import numpy as np
 import numpy.typing as npt
 from pydantic import Field, model_validator
-from scipy.ndimage import gaussian_filter1d
-from scipy.signal import lfilter
 
 from gripbench.configuration import Configuration
 from gripbench.envs import planar_plant as plant
@@ -158,6 +156,8 @@ def lay_road(road: Road, curvature: npt.NDArray[np.float64], length: float, seed
 
 def _smooth(road: Road, points: int, seed: int, name: str) -> npt.NDArray[np.float64]:
     """Return Gaussian noise of unit variance whose autocorrelation falls to 1/e in the length."""
+    from scipy.ndimage import gaussian_filter1d  # slow to import, and few roads are random
+
     width = 0.5 * road.correlation_length / SPACING
     margin = math.ceil(4.0 * width)
     white = stream(seed, f"road.{name}").standard_normal(points + 2 * margin)
@@ -189,6 +189,8 @@ def disturb_field(
             added += amplitude * np.outer(1.5 * along * decay, across)
             at += draws.exponential(1.0 / field.pulse_rate)
     if field.slow_std > 0.0:
+        from scipy.signal import lfilter  # slow to import: it brings scipy.stats
+
         keep = math.exp(-sample_time / field.slow_time)
         steps = stream(seed, "magnetic.slow").standard_normal((samples, 3))
         steps *= field.slow_std * math.sqrt(1.0 - keep * keep)

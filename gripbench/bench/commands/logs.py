@@ -4,31 +4,13 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
-from rich.table import Table
 
-from gripbench.bench.figures.recordings import PICTURES, write_pictures
-from gripbench.bench.recorded import RecordedScore, score_published
-from gripbench.bench.tables import Column, show
-from gripbench.bench.tables import Table as Table_
-from gripbench.bench.tuning import settings_text, tune_published
-from gripbench.envs.logs.channel_map import load_channel_map
-from gripbench.envs.logs.identification import (
-    identified_vehicle,
-    identify_steering,
-    identify_tyres,
-    write_vehicle,
-)
-from gripbench.envs.logs.importing import import_log
-from gripbench.envs.logs.inspection import inspect_log
-from gripbench.envs.logs.locations import VARIABLE, data_folder
-from gripbench.envs.logs.published import load_recording, recording_files
-from gripbench.envs.logs.storing import store
-from gripbench.envs.vehicles import load_vehicle
-from gripbench.errors import InputError
+if TYPE_CHECKING:
+    from gripbench.bench.recorded import RecordedScore
+    from gripbench.bench.tables import Table
 
 
 def register(app: typer.Typer) -> None:
@@ -56,6 +38,11 @@ def import_(
     ] = Path("recordings"),
 ) -> None:
     """Import a log of a real vehicle as a recording, and report its quality."""
+    from gripbench.envs.logs.channel_map import load_channel_map
+    from gripbench.envs.logs.importing import import_log
+    from gripbench.envs.logs.storing import store
+    from gripbench.errors import InputError
+
     if inspect:
         _print_inspection(log, database)
         return
@@ -81,6 +68,8 @@ def path(
     ] = None,
 ) -> None:
     """Print where the files of published recordings are looked for."""
+    from gripbench.envs.logs.locations import VARIABLE, data_folder
+
     chosen = data_folder(folder)
     print(chosen)
     if not chosen.is_dir():
@@ -109,6 +98,11 @@ def recordings(
     ] = "terminal",
 ) -> None:
     """Score methods and trivial estimators on recordings of real vehicles."""
+    from gripbench.bench.figures.recordings import PICTURES, write_pictures
+    from gripbench.bench.recorded import score_published
+    from gripbench.bench.tables import show
+    from gripbench.envs.logs.published import recording_files
+
     scores = score_published(names or recording_files(), method or (), data)
     scored = [score for score in scores if score.status == "ok"]
     if scored:
@@ -132,6 +126,8 @@ def tune(
     ] = None,
 ) -> None:
     """Tune a method's noise levels on the training windows of a recording."""
+    from gripbench.bench.tuning import settings_text, tune_published
+
     tuned = tune_published(recording, method, target, draws, data)
     print(
         f"# {tuned.draws} draws, {target} on the training windows: "
@@ -153,6 +149,17 @@ def identify(
     ] = None,
 ) -> None:
     """Identify tyres, or without a velocity reference the steering, from a recording."""
+    from gripbench.envs.logs.channel_map import load_channel_map
+    from gripbench.envs.logs.identification import (
+        identified_vehicle,
+        identify_steering,
+        identify_tyres,
+        write_vehicle,
+    )
+    from gripbench.envs.logs.published import load_recording, recording_files
+    from gripbench.envs.vehicles import load_vehicle
+    from gripbench.errors import InputError
+
     imported = load_recording(recording, data)
     runs = imported.recordings
     with_tyres = "speed_y" in (runs[0].truth.dtype.names or ())
@@ -174,7 +181,9 @@ def identify(
         print(f"written to {out}")
 
 
-def _table(scores: list[RecordedScore]) -> Table_:
+def _table(scores: list[RecordedScore]) -> Table:
+    from gripbench.bench.tables import Column, Table
+
     rows = [
         {
             "recording": score.recording,
@@ -188,7 +197,7 @@ def _table(scores: list[RecordedScore]) -> Table_:
         }
         for score in scores
     ]
-    return Table_(
+    return Table(
         (
             Column("recording", "Recording"),
             Column("target", "Target"),
@@ -206,6 +215,11 @@ def _table(scores: list[RecordedScore]) -> Table_:
 
 
 def _print_inspection(log: Path, database: str) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    from gripbench.envs.logs.inspection import inspect_log
+
     inspection = inspect_log(log, database)
     table = Table("column", "unit", "samples", "blank", "lowest", "highest")
     for column in inspection.columns:
