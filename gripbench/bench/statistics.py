@@ -16,12 +16,12 @@ Graph. Statist. 13, 2004.
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+from scipy import special  # not scipy.stats, which takes longer to import than most runs to rank
 
 from gripbench.errors import InputError
 
@@ -107,7 +107,7 @@ def mean_log_rms(
         axis=0
     )
     runs = runs if scenarios else 1
-    draws = np.random.default_rng(seed).multinomial(runs, np.full(runs, 1.0 / runs), resamples)
+    draws = _draws(runs, resamples, seed)
     logs = np.zeros((resamples, methods))
     for squares, count, low in zip(sums_of_squares, counts, floor, strict=False):
         logs += np.log(np.maximum(np.sqrt((draws @ squares) / (draws @ count)), low))
@@ -154,7 +154,7 @@ def _p_below_zero(differences: Floats, errors: Floats, runs: int) -> Floats:
         out=np.where(differences < 0.0, -np.inf, np.inf),
         where=errors > INDISTINGUISHABLE,
     )
-    return np.where(same, 1.0, stats.t.cdf(statistic, runs - 1))
+    return np.where(same, 1.0, special.stdtr(runs - 1, statistic))
 
 
 def _unbiased(deviations: Floats, runs: int) -> Floats:
@@ -271,7 +271,7 @@ def interval(
     if runs < 2:
         nothing = np.full(len(estimate), np.nan)
         return nothing, nothing
-    width = stats.t.ppf(0.5 + confidence / 2.0, runs - 1) * errors
+    width = special.stdtrit(runs - 1, 0.5 + confidence / 2.0) * errors
     return estimate - width, estimate + width
 
 
@@ -296,27 +296,37 @@ def pooled_rms_interval(
     Returns
     -------
     Ends of the interval; NaN with fewer than two runs.
+
+    Notes
+    -----
+    Efron and Tibshirani, eq. 14.10 (levels), 14.14 (bias) and 14.15 (acceleration).
     """
     squares, number = np.asarray(sums_of_squares, float), np.asarray(counts, float)
-    if len(squares) < 2:
+    runs = len(squares)
+    if runs < 2:
         return float("nan"), float("nan")
-
-    def pooled(squares: Floats, number: Floats, axis: int = -1) -> Floats:
-        return np.asarray(np.sqrt(squares.sum(axis=axis) / number.sum(axis=axis)))
-
+    point = float(np.sqrt(squares.sum() / number.sum()))
     if np.ptp(squares / number) <= INDISTINGUISHABLE * np.max(squares / number):
-        point = float(pooled(squares, number))  # every resample gives it: nothing to draw
-        return point, point
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", stats.DegenerateDataWarning)
-        found = stats.bootstrap(
-            (squares, number),
-            pooled,
-            paired=True,
-            vectorized=True,
-            confidence_level=confidence,
-            n_resamples=resamples,
-            method="BCa",
-            rng=np.random.default_rng(seed),
-        ).confidence_interval
-    return float(found.low), float(found.high)
+        return point, point  # every resample gives it: nothing to draw
+    draws = _draws(runs, resamples, seed)
+    replicates = np.sqrt((draws @ squares) / (draws @ number))
+    below = 0.5 * (np.mean(replicates < point) + np.mean(replicates <= point))
+    bias = special.ndtri(np.clip(below, 1.0 / resamples, 1.0 - 1.0 / resamples))
+    without = np.sqrt(np.maximum(squares.sum() - squares, 0.0) / (number.sum() - number))
+    influence = without.mean() - without
+    influence /= np.abs(influence).max()
+    acceleration = np.sum(influence**3) / (6.0 * np.sum(influence**2) ** 1.5)
+    normal = bias + special.ndtri([0.5 - confidence / 2.0, 0.5 + confidence / 2.0])
+    # one run that outweighs all others would turn the sign: the interval then ends at its limit
+    levels = special.ndtr(bias + normal / np.maximum(1.0 - acceleration * normal, 1e-12))
+    low, high = np.quantile(replicates, levels)
+    return float(low), float(high)
+
+
+@lru_cache(maxsize=4)
+def _draws(runs: int, resamples: int, seed: int) -> Floats:
+    """Return how often each run is drawn in each resample, shape (resamples, runs)."""
+    drawn = np.random.default_rng(seed).multinomial(runs, np.full(runs, 1.0 / runs), resamples)
+    result = drawn.astype(np.float64)
+    result.flags.writeable = False
+    return result

@@ -211,6 +211,30 @@ def test_pooled_rms_interval_covers_and_narrows():
     assert 1.9 < low < 2.0 < high < 2.1
 
 
+@pytest.mark.parametrize("tail", [20.0, 0.7])
+def test_pooled_rms_interval_is_the_bca_of_scipy(tail):
+    rng = np.random.default_rng(3)
+    counts = rng.integers(100, 300, 40).astype(float)
+    squares = counts * rng.gamma(tail, 1.0, 40)
+    found = statistics.pooled_rms_interval(squares, counts, resamples=20_000)
+    reference = stats.bootstrap(
+        (squares, counts),
+        lambda s, n, axis: np.sqrt(s.sum(axis=axis) / n.sum(axis=axis)),
+        paired=True,
+        method="BCa",
+        n_resamples=20_000,
+        rng=np.random.default_rng(1),
+    ).confidence_interval
+    assert found == pytest.approx((reference.low, reference.high), rel=0.01)
+
+
+def test_pooled_rms_interval_where_one_run_outweighs_all():
+    squares = np.ones(100)
+    squares[7] = 1e12
+    low, high = statistics.pooled_rms_interval(squares, np.full(100, 10.0))
+    assert 0.0 < low <= math.sqrt(squares.sum() / 1000.0) <= high
+
+
 def test_pooled_rms_interval_of_degenerate_runs():
     assert all(map(math.isnan, statistics.pooled_rms_interval([4.0], [1.0])))
     assert statistics.pooled_rms_interval([4.0, 8.0], [1.0, 2.0]) == (2.0, 2.0)
