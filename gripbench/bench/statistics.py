@@ -107,12 +107,21 @@ def mean_log_rms(
         axis=0
     )
     runs = runs if scenarios else 1
-    draws = _draws(runs, resamples, seed)
+    drawn = draws(runs, resamples, seed)
     logs = np.zeros((resamples, methods))
     for squares, count, low in zip(sums_of_squares, counts, floor, strict=False):
-        logs += np.log(np.maximum(np.sqrt((draws @ squares) / (draws @ count)), low))
+        logs += np.log(np.maximum(np.sqrt((drawn @ squares) / (drawn @ count)), low))
     replicates = (logs + constant.sum(axis=0)) / (scenarios + len(fixed))
     return Scores(estimate, replicates, runs)
+
+
+@lru_cache(maxsize=8)
+def draws(runs: int, resamples: int = RESAMPLES, seed: int = 0) -> Floats:
+    """Return how often each run is drawn in each resample, shape (resamples, runs)."""
+    counts = np.random.default_rng(seed).multinomial(runs, np.full(runs, 1.0 / runs), resamples)
+    result = counts.astype(np.float64)
+    result.flags.writeable = False
+    return result
 
 
 def p_better(scores: Scores, margin: float = 0.0) -> Floats:
@@ -308,8 +317,8 @@ def pooled_rms_interval(
     point = float(np.sqrt(squares.sum() / number.sum()))
     if np.ptp(squares / number) <= INDISTINGUISHABLE * np.max(squares / number):
         return point, point  # every resample gives it: nothing to draw
-    draws = _draws(runs, resamples, seed)
-    replicates = np.sqrt((draws @ squares) / (draws @ number))
+    drawn = draws(runs, resamples, seed)
+    replicates = np.sqrt((drawn @ squares) / (drawn @ number))
     below = 0.5 * (np.mean(replicates < point) + np.mean(replicates <= point))
     bias = special.ndtri(np.clip(below, 1.0 / resamples, 1.0 - 1.0 / resamples))
     without = np.sqrt(np.maximum(squares.sum() - squares, 0.0) / (number.sum() - number))
@@ -321,12 +330,3 @@ def pooled_rms_interval(
     levels = special.ndtr(bias + normal / np.maximum(1.0 - acceleration * normal, 1e-12))
     low, high = np.quantile(replicates, levels)
     return float(low), float(high)
-
-
-@lru_cache(maxsize=4)
-def _draws(runs: int, resamples: int, seed: int) -> Floats:
-    """Return how often each run is drawn in each resample, shape (resamples, runs)."""
-    drawn = np.random.default_rng(seed).multinomial(runs, np.full(runs, 1.0 / runs), resamples)
-    result = drawn.astype(np.float64)
-    result.flags.writeable = False
-    return result

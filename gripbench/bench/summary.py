@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import math
-from functools import cache
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from gripbench.bench.rows import pooled_rms
+from gripbench.bench.statistics import CONFIDENCE, draws, pooled_rms_interval
 
-CONFIDENCE = 0.95
-RESAMPLES = 2000
 MARK = "†"
 """Follows the name of a method that reads a channel which no sensor in a vehicle gives."""
 
@@ -31,7 +29,7 @@ def summary(rows: pd.DataFrame) -> pd.DataFrame:
     -------
     Frame with the columns `scenario, target, label, idealised, runs, ok, status, rms, low, high`:
     `rms` is pooled over the runs that are `ok` by the mean of squares, `low` and `high` bound its
-    95 % interval (percentile bootstrap over runs, never over samples), `status` counts the others.
+    95 % interval (BCa bootstrap over runs, never over samples), `status` counts the others.
     For the available friction also, over the runs that are excited, `excited, excited_rms,
     excited_low, excited_high` (number of these runs, RMS from the first excitation on), `settled,
     delay, delay_low, delay_high` (number of runs that settle, mean of their delays [s]) and, where
@@ -44,7 +42,7 @@ def summary(rows: pd.DataFrame) -> pd.DataFrame:
         good = group[group["status"] == "ok"].sort_values("seed")
         squares = good["sum_of_squares"].to_numpy(float)
         counts = good["count"].to_numpy(float)
-        low, high = interval(squares, counts)
+        low, high = pooled_rms_interval(squares, counts)
         others = group.loc[group["status"] != "ok", "status"].value_counts().sort_index()
         lines.append(
             {
@@ -77,7 +75,7 @@ def _friction(good: pd.DataFrame) -> dict[str, Any]:
     excited = good[good["friction_delay"].notna()]
     squares = excited["excited_sum_of_squares"].to_numpy(float)
     counts = excited["excited_count"].to_numpy(float)
-    low, high = interval(squares, counts)
+    low, high = pooled_rms_interval(squares, counts)
     found: dict[str, Any] = {
         "excited": len(excited),
         "excited_rms": pooled_rms(squares, counts),
@@ -101,36 +99,9 @@ def _mean_of_settled(delays: np.ndarray) -> tuple[int, float, float, float]:
     mean = float(finite.mean())
     if len(finite) < 2:
         return 1, mean, math.nan, math.nan
-    means = _resampling(len(finite)) @ finite / len(finite)
+    means = draws(len(finite)) @ finite / len(finite)
     low, high = np.quantile(means, [0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2])
     return len(finite), mean, float(low), float(high)
-
-
-def interval(squares: np.ndarray, counts: np.ndarray) -> tuple[float, float]:
-    """Return the 95 % interval of a pooled RMS by bootstrap over runs, NaN below two runs.
-
-    Parameters
-    ----------
-    squares, counts
-        Sum of squared errors and number of samples of each run, shape (n,).
-    """
-    if len(squares) < 2:
-        return math.nan, math.nan
-    if np.ptp(squares / counts) == 0.0:  # a deterministic scenario: nothing to resample
-        value = pooled_rms(squares, counts)
-        return value, value
-    weights = _resampling(len(squares))
-    pooled = np.sqrt((weights @ squares) / (weights @ counts))
-    low, high = np.quantile(pooled, [0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2])
-    return float(low), float(high)
-
-
-@cache
-def _resampling(runs: int) -> np.ndarray:
-    """Return how often each run is drawn in each resample: the same draws for every cell."""
-    generator = np.random.default_rng(0)
-    drawn: np.ndarray = generator.multinomial(runs, np.full(runs, 1.0 / runs), size=RESAMPLES)
-    return drawn.astype(np.float64)
 
 
 def marked(label: str, idealised: str | tuple[str, ...]) -> str:

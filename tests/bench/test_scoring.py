@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gripbench.bench.scoring import BAND, HOLD, DivergedError, EstimateError, score
-from gripbench.bench.summary import interval
 from gripbench.envs.recordings import Recording
 from gripbench.envs.signals import record_type
 
@@ -109,22 +108,3 @@ def test_a_variance_that_is_not_positive_gives_no_consistency():
 def test_estimates_of_another_form_are_refused(values, message):
     with pytest.raises(EstimateError, match=message):
         score(values, ("mu_front",), ("mu_front",), a_recording(np.ones(100)))
-
-
-def test_the_interval_agrees_with_the_bootstrap_of_scipy():
-    from scipy import stats
-
-    generator = np.random.default_rng(3)
-    counts = generator.integers(100, 300, 60).astype(float)
-    squares = counts * generator.gamma(2.0, 1.0, 60)
-    low, high = interval(squares, counts)
-    reference = stats.bootstrap(
-        (squares, counts),
-        lambda s, n, axis: np.sqrt(s.sum(axis=axis) / n.sum(axis=axis)),
-        paired=True,
-        method="percentile",
-        n_resamples=5000,
-        rng=np.random.default_rng(1),
-    ).confidence_interval
-    assert low == pytest.approx(reference.low, rel=0.02)
-    assert high == pytest.approx(reference.high, rel=0.02)
