@@ -113,11 +113,13 @@ def test_a_heat_map_gives_ratios_to_the_best_and_words_for_failures():
     rows = noisy_rows({"good": 1.0, "bad": 3.0}, seeds=3, spread=0.0)
     rows += [row("broken", seed, None, name) for seed in range(3) for name in ("step", "hill")]
     rows += [row("good", 3, None, "step")]
+    rows += [row("blind", 0, None, "step", status="skipped")]
     found = content.heat_map(frame_of(rows), "mu_front")
-    assert found["methods"] == ["good", "bad", "broken"]
+    assert found["methods"] == ["good", "bad", "broken", "blind"]
     np.testing.assert_allclose(found["ratio"][:2], [[1.0, 1.0], [3.0, 3.0]])
     assert found["ratio"][2] == [None, None]
-    assert found["text"][2] == ["3 failed", "3 failed"]
+    assert found["text"][2] == ["failed", "failed"]
+    assert found["text"][3] == ["–", ""]
     assert found["text"][0][0].endswith("*")
     assert not found["text"][0][1].endswith("*")
 

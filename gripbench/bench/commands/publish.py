@@ -30,6 +30,9 @@ def publish(
     paper: Annotated[
         list[str] | None, typer.Option(help="Only this paper; repeat for more.")
     ] = None,
+    with_papers: Annotated[
+        bool, typer.Option("--papers/--no-papers", help="Whether to reproduce papers.")
+    ] = True,
     workers: Annotated[int, typer.Option(min=0, help="Processes; 0: one a core.")] = 0,
 ) -> None:
     """Run the suites, reproduce the papers; write tables, figures, leaderboard, report, manifest.
@@ -51,7 +54,8 @@ def publish(
     from gripbench.bench.store import Store, read_rows
     from gripbench.errors import unknown
 
-    suites, papers = suite or list(suite_files()), paper or list(paper_files())
+    suites = suite or list(suite_files())
+    papers = (paper or list(paper_files())) if with_papers else []
     for name in papers:
         if name not in paper_files():
             raise unknown("paper", name, paper_files())
@@ -86,8 +90,17 @@ def publish(
         raise typer.Exit(1)
 
 
-def publish_paper(name: str, results: Path) -> tuple[str, list[str]]:
+def publish_paper(name: str, results: Path, figures: bool = True) -> tuple[str, list[str]]:
     """Reproduce a paper and draw its figures.
+
+    Parameters
+    ----------
+    name
+        The paper.
+    results
+        Folder in which the paper has its own.
+    figures
+        Whether to draw them.
 
     Returns
     -------
@@ -103,6 +116,7 @@ def publish_paper(name: str, results: Path) -> tuple[str, list[str]]:
         except typer.Exit as left:
             if not left.exit_code:
                 raise
-    write_figures(name, results / name / "figures")
+    if figures:
+        write_figures(name, results / name / "figures")
     lines = said.getvalue().splitlines()
     return name, [line.removeprefix("changed: ") for line in lines if line.startswith("changed: ")]

@@ -130,7 +130,7 @@ def heat_map(rows: pd.DataFrame, target: str) -> dict[str, Any]:
         for scenario in scenarios:
             line = cells.get((label, scenario))
             known = line is not None and math.isfinite(line["rms"])
-            shown = "" if line is None else str(line["status"])
+            shown = "" if line is None else _words(str(line["status"]))
             if known and line is not None:
                 shown = significant(factor * line["rms"]) + ("*" if line["status"] else "")
                 ratio[-1].append(_ratio(line["rms"], best[scenario]))
@@ -138,6 +138,12 @@ def heat_map(rows: pd.DataFrame, target: str) -> dict[str, Any]:
                 ratio[-1].append(None)
             text[-1].append(shown)
     return {"scenarios": scenarios, "methods": labels, "ratio": ratio, "text": text}
+
+
+def _words(status: str) -> str:
+    """Return what stands in a cell without a result: the worst of its statuses."""
+    found = {part.split()[-1] for part in status.split(", ") if part}
+    return "–" if found == {"skipped"} else ", ".join(sorted(found - {"skipped"}))
 
 
 def _ratio(value: float, best: float) -> float | None:

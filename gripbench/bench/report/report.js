@@ -153,23 +153,23 @@
     const z = map.ratio.map((row) => row.map((value) =>
       value === null ? null : Math.log10(Math.min(value, top))));
     byId("map-plot").style.height = `${Math.max(16, 9 + 2.2 * map.methods.length)}rem`;
+    byId("map-plot").style.minWidth = `${20 + 4.2 * map.scenarios.length}rem`;
     const names = map.scenarios.map((name) => name.replaceAll("_", " "));
-    const failed = { x: [], y: [], text: [] };
-    map.ratio.forEach((row, i) => row.forEach((value, j) => {
-      if (value === null) {
-        failed.x.push(names[j]); failed.y.push(map.methods[i]); failed.text.push(map.text[i][j]);
-      }
+    const words = { x: [], y: [], text: [], color: [] };
+    map.text.forEach((row, i) => row.forEach((text, j) => {
+      words.x.push(names[j]); words.y.push(map.methods[i]); words.text.push(text);
+      words.color.push(z[i][j] === null ? colour("--muted") : z[i][j] < 0.45 * Math.log10(top) ? "#ffffff" : "#000000");
     }));
     react("map-plot", [{
-      type: "heatmap", x: names, y: map.methods, z, text: map.text, texttemplate: "%{text}",
+      type: "heatmap", x: names, y: map.methods, z, text: map.text,
       customdata: map.ratio, colorscale: "Cividis", zmin: 0, zmax: Math.log10(top), xgap: 2, ygap: 2,
       hovertemplate: "%{y}<br>%{x}<br>RMS %{text}<br>%{customdata:.3g} times the best<extra></extra>",
       hoverongaps: false,
       colorbar: { title: { text: "times the best" }, tickvals: [0, Math.log10(2), Math.log10(5), 1, Math.log10(top)],
         ticktext: ["1", "2", "5", "10", "30+"], outlinewidth: 0 },
     }, {
-      type: "scatter", mode: "text", ...failed, hoverinfo: "skip", showlegend: false,
-      textfont: { color: colour("--muted") },
+      type: "scatter", mode: "text", x: words.x, y: words.y, text: words.text,
+      textfont: { color: words.color, size: 12 }, hoverinfo: "skip", showlegend: false,
     }], layout({
       xaxis: axis("", { side: "top", tickangle: -30, showgrid: false }),
       yaxis: axis("", { autorange: "reversed", showgrid: false }),
