@@ -15,10 +15,11 @@ from gripbench.envs import longitudinal_integrators as integrators
 from gripbench.envs.longitudinal_paper_solver import STOP_EVERY, paper_solver, set_inputs
 from gripbench.envs.longitudinal_plant import (
     INPUT_TYPE,
+    TYRE_TYPE,
     compiled,
+    evaluate_tyres,
     plant_record,
     rates,
-    tyre_force,
 )
 from gripbench.envs.profiles import Segment, breakpoints, profile_value, segment_records
 from gripbench.envs.scenarios import Scenario
@@ -61,7 +62,7 @@ class LongitudinalScenario(Scenario):
     """
 
     world: Literal["longitudinal"]
-    integrator: Literal["rodas3", "rk4", "paper"] = "rodas3"
+    integrator: Literal["ros3", "rk4", "paper"] = "ros3"
     initial_speed: float = Field(default=1.0, ge=0.0, le=100.0)
     road_grade: float = Field(default=0.0, ge=-0.5, le=0.5)
     friction: tuple[Segment, ...] = Field(min_length=1)
@@ -111,9 +112,9 @@ TRUTH_TYPE = record_type(
 
 
 @compiled
-def _write_truth(time, x, inputs, plant, dx, truth):  # type: ignore[no-untyped-def]
-    force_front = tyre_force(x[1], x[0], inputs.mu_front, plant.load_front, plant)
-    force_rear = tyre_force(x[2], x[0], inputs.mu_rear, plant.load_rear, plant)
+def _write_truth(time, x, inputs, plant, tyres, dx, truth):  # type: ignore[no-untyped-def]
+    force_front = inputs.mu_front * plant.load_front * tyres.front
+    force_rear = inputs.mu_rear * plant.load_rear * tyres.rear
     rates(x, force_front, force_rear, inputs, plant, dx)
     truth.time = time
     truth.speed_x = x[0]
@@ -137,12 +138,15 @@ def _write_truth(time, x, inputs, plant, dx, truth):  # type: ignore[no-untyped-
 
 
 @compiled
-def _advance(k, sample_time, x, step, inputs, plant, integrator, jumps, work, truth):  # type: ignore[no-untyped-def]
+def _advance(  # type: ignore[no-untyped-def]
+    k, sample_time, x, step, inputs, plant, integrator, jumps, tyres, work, truth
+):
     """Advance from sample `k` to the next; `jumps` are the wheel speeds' relative jumps at it."""
-    step = integrators.integrate(x, step, sample_time, inputs, plant, integrator, work)
+    step = integrators.integrate(x, step, sample_time, inputs, plant, integrator, tyres, work)
     x[1] *= 1.0 + jumps[0]
     x[2] *= 1.0 + jumps[1]
-    _write_truth((k + 1) * sample_time, x, inputs, plant, work[10], truth)
+    evaluate_tyres(x, plant, tyres)
+    _write_truth((k + 1) * sample_time, x, inputs, plant, tyres, work[9], truth)
     return step
 
 
@@ -157,22 +161,37 @@ def _command(k, sample_time, front, rear, friction, grade, inputs):  # type: ign
 
 
 @compiled
-def _run(sample_time, x, step, inputs, plant, integrator, profiles, grade, jumps, work, truth):  # type: ignore[no-untyped-def]
+def _run(  # type: ignore[no-untyped-def]
+    sample_time, x, step, inputs, plant, integrator, profiles, grade, jumps, tyres, work, truth
+):
     front, rear, friction = profiles
     for k in range(truth.shape[0] - 1):
         _command(k, sample_time, front, rear, friction, grade, inputs[0])
         step = _advance(
-            k, sample_time, x, step, inputs[0], plant[0], integrator, jumps[k], work, truth[k + 1]
+            k,
+            sample_time,
+            x,
+            step,
+            inputs[0],
+            plant[0],
+            integrator,
+            jumps[k],
+            tyres[0],
+            work,
+            truth[k + 1],
         )
 
 
 @compiled
-def _sampled_truth(times, states, inputs, plant, profiles, grade, work, truth):  # type: ignore[no-untyped-def]
+def _sampled_truth(  # type: ignore[no-untyped-def]
+    times, states, inputs, plant, profiles, grade, tyres, work, truth
+):
     front, rear, friction = profiles
     last = times[-1] - 1e-12  # profiles end at the horizon; its sample belongs to their inside
     for k in range(times.shape[0]):
         set_inputs(inputs[0], min(times[k], last), front, rear, friction, grade)
-        _write_truth(times[k], states[k], inputs[0], plant[0], work[10], truth[k])
+        evaluate_tyres(states[k], plant[0], tyres[0])
+        _write_truth(times[k], states[k], inputs[0], plant[0], tyres[0], work[9], truth[k])
 
 
 class LongitudinalSimulation(Simulation):
@@ -203,6 +222,7 @@ class LongitudinalSimulation(Simulation):
         self._segments = (driver.front, rear, scenario.friction)
         self._profiles = tuple(segment_records(part) for part in self._segments)
         self._inputs = np.zeros(1, INPUT_TYPE)
+        self._tyres = np.zeros(1, TYRE_TYPE)
         self._work = integrators.scratch()
         self._step = _FIRST_STEP
         self._start()
@@ -212,14 +232,16 @@ class LongitudinalSimulation(Simulation):
         if self.sample_time is None:
             raise GripbenchError(
                 f"{self.scenario.name}: the paper's solver chooses its own steps and cannot be "
-                "advanced sample by sample; set integrator = 'rodas3'"
+                "advanced sample by sample; set integrator = 'ros3'"
             )
         self._start()
         self._jumps = _jump_stream(seed)
         self._pending = np.empty((0, 2))
         truth = np.zeros(1, TRUTH_TYPE)
         self._set_start_inputs()
-        _write_truth(0.0, self._x, self._inputs[0], self._plant[0], self._work[10], truth[0])
+        plant, tyres = self._plant[0], self._tyres[0]
+        evaluate_tyres(self._x, plant, tyres)
+        _write_truth(0.0, self._x, self._inputs[0], plant, tyres, self._work[9], truth[0])
         return truth
 
     def drive(self) -> npt.NDArray[np.float64]:
@@ -247,6 +269,7 @@ class LongitudinalSimulation(Simulation):
             self._plant[0],
             self._integrator,
             self._pending[0],
+            self._tyres[0],
             self._work,
             truth[0],
         )
@@ -273,6 +296,7 @@ class LongitudinalSimulation(Simulation):
             self._profiles,
             self.scenario.road_grade,
             self._draw(self.scenario.steps),
+            self._tyres,
             self._work,
             truth,
         )
@@ -335,6 +359,7 @@ class LongitudinalSimulation(Simulation):
             self._plant,
             self._profiles,
             scenario.road_grade,
+            self._tyres,
             self._work,
             truth,
         )
@@ -352,6 +377,7 @@ class LongitudinalLanes(Lanes):
         self._steps = np.zeros(count)
         self._k = np.zeros(count, np.int64)
         self._jumps = np.zeros((count, _CHUNK, 2))
+        self._tyres = np.zeros(count, TYRE_TYPE)
         self._ended = [""] * count
 
     @property
@@ -364,6 +390,7 @@ class LongitudinalLanes(Lanes):
         run = self._runs[lane]
         truth = run.reset(seed)
         self._x[lane], self._steps[lane], self._k[lane] = run._x, run._step, 0
+        self._tyres[lane] = run._tyres[0]
         self._ended[lane] = ""
         return truth
 
@@ -392,6 +419,7 @@ class LongitudinalLanes(Lanes):
             first._profiles,
             first.scenario.road_grade,
             self._jumps,
+            self._tyres,
             first._work,
             truth,
         )
@@ -422,6 +450,7 @@ def _advance_lanes(  # type: ignore[no-untyped-def]
     profiles,
     grade,
     jumps,
+    tyres,
     work,
     truth,
 ):
@@ -439,6 +468,7 @@ def _advance_lanes(  # type: ignore[no-untyped-def]
             plant[0],
             integrator,
             jumps[lane, k[lane] % jumps.shape[1]],
+            tyres[lane],
             work,
             truth[lane],
         )

@@ -51,6 +51,14 @@ INPUT_TYPE = np.dtype(
 )
 """What acts on the plant during one interval: axle torques [N m], friction, road grade [rad]."""
 
+TYRE_TYPE = np.dtype(
+    [
+        (name, np.float64)
+        for name in ("front", "front_wheel", "front_speed", "rear", "rear_wheel", "rear_speed")
+    ]
+)
+"""Force of each axle over its peak mu F_z, and its slopes to wheel speed and speed."""
+
 compiled = numba.njit(cache=True, error_model="numpy", nogil=True)
 _inline = numba.njit(inline="always", error_model="numpy")
 
@@ -127,13 +135,20 @@ def derivatives(x, inputs, plant, dx):  # type: ignore[no-untyped-def]
 
 
 @_inline
-def _force_slopes(wheel_speed, speed, mu, load, plant):  # type: ignore[no-untyped-def]
+def _tyre_slopes(wheel_speed, speed, plant):  # type: ignore[no-untyped-def]
+    """Return an axle's force over its peak, and its slopes to wheel speed and speed."""
     rolling = plant.wheel_radius * wheel_speed
     slip = slip_ratio(rolling, speed)
     share, slope = magic_formula_slope(slip, plant.magic_b, plant.magic_c, plant.magic_e)
     to_rolling, to_speed = slip_ratio_slopes(rolling, speed)
-    slope *= mu * load
-    return mu * load * share, slope * to_rolling * plant.wheel_radius, slope * to_speed
+    return share, slope * to_rolling * plant.wheel_radius, slope * to_speed
+
+
+@compiled
+def evaluate_tyres(x, plant, tyres):  # type: ignore[no-untyped-def]
+    """Write a record of `TYRE_TYPE`: the tyres at a state, whatever the friction."""
+    tyres.front, tyres.front_wheel, tyres.front_speed = _tyre_slopes(x[1], x[0], plant)
+    tyres.rear, tyres.rear_wheel, tyres.rear_speed = _tyre_slopes(x[2], x[0], plant)
 
 
 @_inline
@@ -142,13 +157,17 @@ def _torque_slope(torque, wheel_speed, radius):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def linearise(x, inputs, plant, dx, jac):  # type: ignore[no-untyped-def]
-    """Write the derivative and its Jacobian, shape (3, 3): an arrow, the axles do not couple."""
-    force_front, front_w, front_v = _force_slopes(
-        x[1], x[0], inputs.mu_front, plant.load_front, plant
-    )
-    force_rear, rear_w, rear_v = _force_slopes(x[2], x[0], inputs.mu_rear, plant.load_rear, plant)
-    rates(x, force_front, force_rear, inputs, plant, dx)
+def linearise(x, inputs, plant, tyres, dx, jac):  # type: ignore[no-untyped-def]
+    """Write the derivative and its Jacobian, shape (3, 3): an arrow, the axles do not couple.
+
+    `tyres` is the record of `TYRE_TYPE` that belongs to the state; other arguments as for
+    `derivatives`.
+    """
+    front = inputs.mu_front * plant.load_front
+    rear = inputs.mu_rear * plant.load_rear
+    rates(x, front * tyres.front, rear * tyres.rear, inputs, plant, dx)
+    front_w, front_v = front * tyres.front_wheel, front * tyres.front_speed
+    rear_w, rear_v = rear * tyres.rear_wheel, rear * tyres.rear_speed
     radius, inertia = plant.wheel_radius, plant.wheel_inertia
     jac[0, 0] = (
         (front_v + rear_v) / plant.mass

@@ -9,7 +9,14 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from gripbench.envs.longitudinal import TRUTH_TYPE
-from gripbench.envs.longitudinal_plant import INPUT_TYPE, derivatives, linearise, plant_record
+from gripbench.envs.longitudinal_plant import (
+    INPUT_TYPE,
+    TYRE_TYPE,
+    derivatives,
+    evaluate_tyres,
+    linearise,
+    plant_record,
+)
 from gripbench.envs.profiles import breakpoints, profile_value, segment_records
 from gripbench.envs.vehicles import GRAVITY, load_vehicle
 from gripbench.envs.worlds import load_scenario, record, simulation_of
@@ -93,6 +100,7 @@ def rollout(chosen):
 def _compiled_slope(profiles, grade, end):
     """Return derivative and Jacobian over time: gripbench's own compiled functions."""
     inputs = np.zeros(1, INPUT_TYPE)
+    tyres = np.zeros(1, TYRE_TYPE)
     dx, jac = np.zeros(3), np.zeros((3, 3))
 
     def set_inputs(t):
@@ -107,7 +115,8 @@ def _compiled_slope(profiles, grade, end):
 
     def jacobian(t, x):
         set_inputs(t)
-        linearise(x, inputs[0], PLANT[0], dx, jac)
+        evaluate_tyres(x, PLANT[0], tyres[0])
+        linearise(x, inputs[0], PLANT[0], tyres[0], dx, jac)
         return jac.copy()
 
     return slope, jacobian

@@ -33,7 +33,7 @@ def custom(front, horizon=10.0, **changes):
         "world": "longitudinal",
         "vehicle": "li2014",
         "horizon": horizon,
-        "integrator": "rodas3",
+        "integrator": "ros3",
         "sensor_suite": "li2014",
         "friction": [{"start": 0.0, "end": horizon, "first": 0.9, "last": 0.9}],
         "driver": {"front": pieces},

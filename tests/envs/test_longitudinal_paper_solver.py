@@ -103,7 +103,7 @@ def test_initial_samples(friction_step):
 
 def test_paper_solver_cannot_be_stepped():
     scenario = load_scenario("li2014_constant_mu")
-    with pytest.raises(GripbenchError, match="rodas3"):
+    with pytest.raises(GripbenchError, match="ros3"):
         LongitudinalSimulation(scenario, load_vehicle("li2014")).reset(0)
 
 

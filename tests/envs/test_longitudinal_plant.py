@@ -10,7 +10,9 @@ from gripbench.envs.longitudinal_plant import (
     HOLD_SPEED,
     INPUT_TYPE,
     PLANT_PARAMETERS,
+    TYRE_TYPE,
     derivatives,
+    evaluate_tyres,
     linearise,
     plant_record,
 )
@@ -83,7 +85,9 @@ def test_jacobian_is_the_derivative(v, front, rear, tf):
     inputs = _inputs((tf, 0.7 * tf), (0.9, 0.6), 0.02)
     analytic = np.zeros((3, 3))
     dx = np.zeros(3)
-    linearise(x, inputs, PLANT[0], dx, analytic)
+    tyres = np.zeros(1, TYRE_TYPE)
+    evaluate_tyres(x, PLANT[0], tyres[0])
+    linearise(x, inputs, PLANT[0], tyres[0], dx, analytic)
     np.testing.assert_array_equal(dx, _derivatives(x, inputs))
     numeric = np.zeros((3, 3))
     for i in range(3):

@@ -28,7 +28,7 @@ def test_environment_ids_are_unique():
 def test_accurate_and_paper_scenarios_differ_in_the_integrator_only(name):
     ours, paper = load_scenario(name), load_scenario(f"li2014_{name}")
     assert paper.integrator == "paper"
-    assert ours.integrator == "rodas3"
+    assert ours.integrator == "ros3"
     for key in ("friction", "driver", "road_grade", "horizon", "vehicle", "initial_speed"):
         assert getattr(ours, key) == getattr(paper, key)
     assert ours.all_sensors() == paper.all_sensors()
@@ -114,8 +114,8 @@ def _file(tmp_path, old, new):
         ("end = 1.0", "ende = 1.0", r"driver\.front\.0\.end"),
         ("start = 1.0, end = 20.0", "start = 20.0, end = 1.0", "is not after start"),
         ("wheel_speed_noise = 3.6e-4", "wheel_speed_noise = -1.0", "'wheel_speed_noise'"),
-        ('"rodas3"', '"euler"', "key 'integrator'.*'rodas3', 'rk4' or 'paper'"),
-        ('"rodas3"', '"paper"', "wheel_speed_noise has no meaning"),
+        ('"ros3"', '"euler"', "key 'integrator'.*'ros3', 'rk4' or 'paper'"),
+        ('"ros3"', '"paper"', "wheel_speed_noise has no meaning"),
         ('"longitudinal"', '"longitudnal"', "key 'world'.*did you mean 'longitudinal'"),
         ("[driver]", "[sensors.acel_x]\n[driver]", "'acel_x': did you mean 'accel_x'"),
         ("[driver]", "[sensors.accel_x]\nnoise = 1.0\n[driver]", "did you mean 'noise_"),

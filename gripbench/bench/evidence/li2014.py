@@ -263,12 +263,12 @@ def changes(seeds: int) -> tuple[Change, ...]:
         ),
         Change(
             "settings", "solver", "accurate integrator, no noise",
-            _of_scenario(integrator="rodas3"),
+            _of_scenario(integrator="ros3"),
             figure=lambda _: figures.solver_error(_named(_SIMPLE, 0)),
         ),
         Change(
             "settings", "solver", "accurate, wheel speed noise 3.6e-4",
-            _of_scenario(integrator="rodas3", wheel_speed_noise=3.6e-4),
+            _of_scenario(integrator="ros3", wheel_speed_noise=3.6e-4),
         ),
         Change("settings", "torque", "no ramp in the first second", _without_ramp),
         Change(
