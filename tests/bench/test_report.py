@@ -89,6 +89,13 @@ def test_series_are_those_of_the_run_and_bands_those_of_the_errors():
     assert list(made["truth"]["sideslip"]) == ["1"]
 
 
+def test_a_method_that_is_not_at_hand_has_no_curve():
+    plan = series.SeriesPlan(SCENARIO, {"mu_front": ("slip_slope", "filter_of_a_file")}, (0,), (0,))
+    made = series.series_of(plan)
+    assert list(made["estimates"]["mu_front"]) == ["slip_slope"]
+    assert list(made["bands"]["mu_front"]) == ["slip_slope"]
+
+
 def test_series_are_the_same_in_one_process_and_in_several():
     plans = [
         series.SeriesPlan(name, {"mu_front": ("slip_slope:paper",)}, (0,), (0,))

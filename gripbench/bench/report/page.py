@@ -102,7 +102,6 @@ def series_plans(
     """Return what to draw of each scenario: methods that ran there, on seeds that were run."""
     plans = []
     good = rows[(rows["status"] == "ok") & rows["target"].isin(targets)]
-    good = good[~good["label"].str.contains(".py", regex=False)]
     for scenario, part in good.groupby("scenario", sort=False):
         seeds = tuple(int(seed) for seed in sorted(part["seed"].unique()))
         estimates = {

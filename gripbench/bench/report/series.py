@@ -124,7 +124,7 @@ def series_of(plan: SeriesPlan) -> dict[str, Any]:
                 try:
                     made = runs.estimates(plan.scenario, label, seed)[target]
                 except GripbenchError:
-                    continue  # the failures of a method have a section of their own
+                    continue  # it failed, as another section says, or its file is not at hand
                 value = scale * at_times(recording["time"], made, times)
                 if seed in plan.shown:
                     of_label = estimates.setdefault(target, {}).setdefault(label, {})
