@@ -191,6 +191,11 @@ class SensorSuite:
                 raise InputError(f"sensors.{channel}: the plant gives no '{source}' to measure")
             if sensor.delay > 0.0 and sample_time is None:
                 raise InputError(f"sensors.{channel}.delay needs equally spaced samples")
+            if sample_time is not None and sensor.rate * sample_time > 1.0 + 1e-9:
+                raise InputError(
+                    f"sensors.{channel}.rate is {sensor.rate:g} Hz: faster than the scenario's "
+                    f"samples, {1.0 / sample_time:g} Hz"
+                )
             first, drawn, walked = np.random.SeedSequence(
                 [seed, zlib.crc32(channel.encode())]
             ).spawn(3)

@@ -196,3 +196,9 @@ def test_unknown_channels_are_named():
 def test_negative_settings_are_refused(key):
     with pytest.raises(InputError, match=rf"file\.toml: key '{key}'.*greater than or equal to 0"):
         parse(Sensor, {key: -1.0}, "file.toml")
+
+
+def test_a_rate_above_that_of_the_samples_is_refused():
+    with pytest.raises(InputError, match=r"sensors\.accel_x\.rate is 1500 Hz: faster than .* 1000"):
+        SensorSuite({"accel_x": Sensor(rate=1500.0)}, TRUTH, 1e-3, 0)
+    SensorSuite({"accel_x": Sensor(rate=1000.0)}, TRUTH, 1e-3, 0)
