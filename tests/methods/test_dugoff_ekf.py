@@ -1,16 +1,17 @@
 """The Dugoff EKF: tyre and Jacobian, its filterpy twin, symmetry, friction, the errata."""
 
+import lateral_twins
 import numpy as np
 import pytest
-from filterpy.kalman import ExtendedKalmanFilter
 from hypothesis import given
 from hypothesis import strategies as st
+from lateral_twins import dugoff_model
 
 from gripbench.envs.recordings import select_channels
 from gripbench.envs.tyres_combined import DUGOFF, combined_force
 from gripbench.envs.vehicles import load_vehicle
 from gripbench.envs.worlds import load_scenario, record
-from gripbench.methods.dugoff_ekf import DUGOFF_PARAMETERS, DUGOFF_STATE, DugoffEkf, evaluate
+from gripbench.methods.dugoff_ekf import DugoffEkf, evaluate
 from gripbench.methods.dugoff_tyre import dugoff_force, dugoff_slips
 
 VEHICLE = load_vehicle("dakhlallah2008").values()
@@ -63,25 +64,9 @@ def test_slips_are_those_of_the_paper(speed, ratio, tangent, printed):
     assert y_l == pytest.approx((up[1] - down[1]) / (2 * h), abs=1e-6)
 
 
-def model(settings=None):
-    """Return a state record and the parameters of the filter."""
-    values = {name: VEHICLE[name] for name in DugoffEkf.vehicle_parameters}
-    values |= {parameter.name: parameter.default for parameter in DUGOFF_PARAMETERS}
-    values |= settings or {}
-    params = np.array([tuple(values.values())], [(name, np.float64) for name in values])
-    return np.zeros(1, DUGOFF_STATE)[0], params[0]
-
-
-def set_inputs(state, sample):
-    state["steer_angle"] = sample["steer_angle"]
-    state["accel_x"], state["accel_y"] = sample["accel_x"], sample["accel_y"]
-    for i, wheel in enumerate(WHEELS):
-        state["rolling"][i] = VEHICLE["wheel_radius"] * sample[f"wheel_speed_{wheel}"]
-
-
 @pytest.mark.parametrize("printed_slip", [0.0, 1.0])
 def test_jacobian_is_the_derivative_of_the_model(printed_slip):
-    state, params = model({"printed_slip": printed_slip})
+    state, params = dugoff_model(VEHICLE, {"printed_slip": printed_slip})
     rng = np.random.default_rng(0)
 
     def rate(x):
@@ -103,7 +88,7 @@ def test_jacobian_is_the_derivative_of_the_model(printed_slip):
 
 def test_wheel_loads_carry_the_vehicle_and_its_moments():
     """Eq. 6 with the full track: loads balance weight, pitch and roll moment."""
-    state, params = model()
+    state, params = dugoff_model(VEHICLE)
     state["filter"]["x"][:] = [20.0, 0.0, 0.0]
     state["rolling"][:] = 20.0
     state["accel_x"], state["accel_y"] = 2.0, 3.0
@@ -122,28 +107,10 @@ def test_agrees_with_filterpy(run):
     method = DugoffEkf("paper_step")
     obs = run.observations[:500]
     ours = method.run(VEHICLE, obs)
-    state, params = model()
-    set_ = method.settings
-    twin = ExtendedKalmanFilter(dim_x=3, dim_z=2)
-    twin.x = np.array([obs["speed_x"][0], 0.0, obs["yaw_rate"][0]])
-    noise = 10.0 * np.array([set_["speed_x_noise"], set_["yaw_rate_noise"]])  # at 100 Hz
-    twin.P = np.diag(np.square([noise[0], set_["speed_y_std"], noise[1]]))
-    twin.R = np.diag(np.square(noise))
-    walk = np.diag([set_["speed_x_walk"], set_["speed_y_walk"], set_["yaw_rate_walk"]])
-    H = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    for k in range(1, len(obs)):
-        step = obs["time"][k] - obs["time"][k - 1]
-        set_inputs(state, obs[k - 1])
-        state["filter"]["x"][:] = twin.x
-        evaluate(state, params)
-        twin.F = np.eye(3) + step * state["slope"]
-        twin.x = twin.x + step * state["rate"]
-        twin.P = twin.F @ twin.P @ twin.F.T + step * walk
-        z = np.array([obs["speed_x"][k], obs["yaw_rate"][k]])
-        twin.update(z, lambda _: H, lambda x: H @ x)
-        np.testing.assert_allclose([ours[k][s] for s in STATES], twin.x, rtol=1e-9, atol=1e-9)
+    states, covariance = lateral_twins.dugoff(method, obs, VEHICLE)
     for i, name in enumerate(STATES):
-        assert ours[name + "_variance"][-1] == pytest.approx(twin.P[i, i], rel=1e-9)
+        np.testing.assert_allclose(ours[name], states[:, i], rtol=1e-9, atol=1e-9)
+        assert ours[name + "_variance"][-1] == pytest.approx(covariance[i, i], rel=1e-9)
 
 
 def test_held_readings_count_once(run):

@@ -1,8 +1,8 @@
 """The kinematic filter: its filterpy twin, closed forms, late and repeated GPS samples."""
 
+import lateral_twins
 import numpy as np
 import pytest
-from filterpy.kalman import KalmanFilter
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from single_track_drive import STEP, drive, turn
@@ -12,38 +12,11 @@ from gripbench.methods.kinematic_kalman_filter import KinematicKalmanFilter
 STEER = turn()
 
 
-def twin(method, obs):
-    """Run filterpy over heading and bias with the published rule of turns."""
-    set_ = method.settings
-    filter = KalmanFilter(dim_x=2, dim_z=1)
-    filter.F = np.array([[1.0, -STEP], [0.0, 1.0]])
-    filter.B = np.array([[STEP], [0.0]])
-    filter.Q = STEP * np.diag([set_["gyro_noise"] ** 2, set_["bias_walk"] ** 2])
-    filter.H = np.array([[1.0, 0.0]])
-    filter.R = np.array([[(set_["gps_speed_noise"] / 30.0) ** 2]])
-    filter.x = np.array([[obs["course"][0]], [0.0]])
-    filter.P = np.diag([filter.R[0, 0], set_["bias_std"] ** 2])
-    smooth, until = 0.0, -np.inf
-    states = [filter.x[:, 0].copy()]
-    for k in range(1, len(obs)):
-        filter.predict(u=np.array([[0.5 * (obs["yaw_rate"][k - 1] + obs["yaw_rate"][k])]]))
-        share = 1.0 - np.exp(-STEP / set_["turn_smoothing"])
-        smooth += share * (obs["yaw_rate"][k] - smooth)
-        limit = set_["turn_rate"] + 2.0 * np.sqrt(filter.P[1, 1])
-        if abs(smooth - filter.x[1, 0]) > limit:
-            until = obs["time"][k] + set_["turn_hold"]
-        if obs["course_new"][k] and obs["time"][k] >= until:
-            residual = (obs["course"][k] - filter.x[0, 0] + np.pi) % (2 * np.pi) - np.pi
-            filter.update(filter.x[0, 0] + residual)
-        states.append(filter.x[:, 0].copy())
-    return np.array(states), filter.P
-
-
 def test_agrees_with_filterpy():
     obs, _ = drive(STEER, seed=3, bias=0.005)
     method = KinematicKalmanFilter()
     ours = method.run({}, obs)
-    states, covariance = twin(method, obs)
+    states, covariance = lateral_twins.kinematic(method, obs)
     wrapped = (states[:, 0] + np.pi) % (2 * np.pi) - np.pi
     np.testing.assert_allclose(ours["yaw"], wrapped, atol=1e-9)
     np.testing.assert_allclose(ours["gyro_bias"], states[:, 1], atol=1e-9)

@@ -1,13 +1,13 @@
 """The model-based filter: its filterpy twin, steady states, consistency, late GPS, the errata."""
 
+import lateral_twins
 import numpy as np
 import pytest
-from filterpy.kalman import KalmanFilter
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.linalg import expm
-from single_track_drive import BLAZER, STEP, drive, held, turn
+from single_track_drive import BLAZER, STEP, drive, turn
 
 from gripbench.bench.consistency import chi_square_test, normalised_squares, whiteness_test
 from gripbench.bench.riccati import poles
@@ -27,41 +27,11 @@ def test_exponential_is_scipys(matrix):
     np.testing.assert_allclose(result, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
 
 
-def twin(method, obs, vehicle, speed):
-    """Run filterpy over the four states, every matrix from scipy."""
-    set_ = method.settings
-    transition, inputs = held(vehicle, speed)
-    filter = KalmanFilter(dim_x=4, dim_z=1)
-    filter.F = np.eye(4)
-    filter.F[:3, :3] = transition
-    filter.B = np.vstack([inputs[:, :1], [[0.0]]])
-    filter.Q = filter.B @ filter.B.T * set_["steer_noise"] ** 2 / STEP
-    filter.Q[3, 3] += set_["bias_walk"] ** 2 * STEP
-    course_variance = (set_["gps_speed_noise"] / speed) ** 2
-    gyro_variance = set_["gyro_noise"] ** 2 / STEP
-    gyro, gps = np.array([[0.0, 1.0, 0.0, 1.0]]), np.array([[1.0, 0.0, 1.0, 0.0]])
-    beta, bias = set_["sideslip_std"] ** 2, set_["bias_std"] ** 2
-    filter.x = np.array([[0.0], [obs["yaw_rate"][0]], [obs["course"][0]], [0.0]])
-    filter.P = np.diag([beta, gyro_variance + bias, beta + course_variance, bias])
-    filter.P[0, 2] = filter.P[2, 0] = -beta
-    filter.update(obs["yaw_rate"][0], R=gyro_variance, H=gyro)
-    states = [filter.x[:, 0].copy()]
-    for k in range(1, len(obs)):
-        filter.predict(u=np.array([[0.5 * (obs["steer_angle"][k - 1] + obs["steer_angle"][k])]]))
-        if obs["course_new"][k]:
-            predicted = filter.x[0, 0] + filter.x[2, 0]
-            residual = (obs["course"][k] - predicted + np.pi) % (2.0 * np.pi) - np.pi
-            filter.update(predicted + residual, R=course_variance, H=gps)
-        filter.update(obs["yaw_rate"][k], R=gyro_variance, H=gyro)
-        states.append(filter.x[:, 0].copy())
-    return np.array(states), filter.P
-
-
 def test_agrees_with_filterpy():
     obs, _ = drive(STEER[:2500], seed=1, bias=0.005, noise=NOISE)
     method = ModelBasedKalmanFilter()
     ours = method.run(BLAZER, obs)
-    states, covariance = twin(method, obs, BLAZER, 30.0)
+    states, covariance = lateral_twins.single_track(method, obs, BLAZER, 30.0)
     for name, column in (("sideslip", 0), ("yaw_rate", 1), ("gyro_bias", 3)):
         np.testing.assert_allclose(ours[name], states[:, column], atol=1e-9)
     for i, name in enumerate(("sideslip", "yaw_rate", "yaw", "gyro_bias")):
