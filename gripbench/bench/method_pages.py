@@ -20,6 +20,9 @@ from gripbench.methods.contract import CompiledMethod
 FAILS = 3.0
 """A method fails in a scenario where its RMS is this many times that of the scenario's best."""
 
+SHOWN = 6
+"""Number of scenarios that the page names for a method, the worst."""
+
 
 def catalogue_page(results: Path) -> str:
     """Return the catalogue as Markdown.
@@ -46,33 +49,41 @@ def catalogue_page(results: Path) -> str:
 
 
 def failures_of(name: str, published: Leaderboard) -> list[str]:
-    """Return a sentence for each target and scenario in which a method fails.
+    """Return a sentence for each target and scenario in which a method fails, the worst first.
 
     It fails where some runs gave no result, or where its RMS is `FAILS` times the lowest that a
-    method of the leaderboard has there.
+    method without idealised channels has there. At most `SHOWN` of the latter are named.
     """
-    rms: dict[tuple[str, str], dict[str, float]] = {}
+    idealised = {
+        line["label"]
+        for board in published.boards
+        for line in board["methods"]
+        if line["idealised"]
+    }
+    best: dict[tuple[str, str], float] = {}
     for run in published.runs:
         value = pooled_rms(run.sums_of_squares, run.counts)
-        rms.setdefault((run.target, run.scenario), {})[run.label] = value
-    lines = []
+        if run.label not in idealised and math.isfinite(value):
+            key = (run.target, run.scenario)
+            best[key] = min(value, best.get(key, math.inf))
+    broken, worse = [], []
     for run in published.runs:
-        broken = [text for text in run.failed.values() if not text.startswith("skipped")]
-        if run.label != name or not (run.seeds or broken):
+        if run.label != name:
             continue
-        of_all = rms[run.target, run.scenario]
-        best = min((value for value in of_all.values() if math.isfinite(value)), default=math.nan)
-        if broken:
-            lines.append(
-                f"`{run.target}` in {run.scenario}: {len(broken)} of "
-                f"{len(run.seeds) + len(broken)} runs failed ({broken[0]})"
-            )
-        elif best > 0.0 and of_all[name] >= FAILS * best:
-            lines.append(
-                f"`{run.target}` in {run.scenario}: RMS {significant(of_all[name])}, "
-                f"{significant(of_all[name] / best, 2)} times the best"
-            )
-    return lines
+        where = f"`{run.target}` in {run.scenario}"
+        failed = [text for text in run.failed.values() if not text.startswith("skipped")]
+        if failed:
+            total = len(run.seeds) + len(failed)
+            broken.append(f"{where}: {len(failed)} of {total} runs failed ({failed[0]})")
+            continue
+        value = pooled_rms(run.sums_of_squares, run.counts)
+        lowest = best.get((run.target, run.scenario), math.nan)
+        if lowest > 0.0 and value >= FAILS * lowest:
+            ratio = value / lowest
+            text = f"RMS {significant(value)}, {significant(ratio, 2)} times the best"
+            worse.append((ratio, f"{where}: {text}"))
+    worse.sort(reverse=True)
+    return broken + [text for _, text in worse[:SHOWN]]
 
 
 def _overview(methods: Mapping[str, type[CompiledMethod]]) -> Table:
@@ -139,7 +150,9 @@ def _entry(method: type[CompiledMethod], published: Leaderboard | None) -> str:
     if published is not None:
         lines = failures_of(method.name, published)
         if lines:
-            parts.append("Where it fails:\n")
+            parts.append(
+                "Where it is worst, against the best method without idealised channels there:\n"
+            )
             parts.append("\n".join(f"- {line}" for line in lines) + "\n")
         elif any(run.label == method.name for run in published.runs):
             parts.append(f"Nowhere in the published suites {FAILS:g} times worse than the best.\n")

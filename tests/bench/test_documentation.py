@@ -82,6 +82,23 @@ def test_a_method_fails_where_it_is_three_times_worse_than_the_best():
     ]
 
 
+def test_the_best_is_a_method_that_a_vehicle_could_have():
+    board = published(runs("ideal", 0.01), runs("best", 0.1), runs("poor", 0.5))
+    boards = ({"methods": [{"label": "ideal", "idealised": "wheel_acceleration_front"}]},)
+    board = board.model_copy(update={"boards": boards})
+    assert method_pages.failures_of("best", board) == []
+    assert len(method_pages.failures_of("poor", board)) == 1
+
+
+def test_the_worst_scenarios_come_first():
+    scenarios = [f"s{number}" for number in range(10)]
+    found = [runs("best", 0.1, name) for name in scenarios]
+    found += [runs("poor", 0.1 * (4 + number), name) for number, name in enumerate(scenarios)]
+    lines = method_pages.failures_of("poor", published(*found))
+    assert len(lines) == method_pages.SHOWN
+    assert lines[0] == "`mu` in s9: RMS 1.30, 13 times the best"
+
+
 def test_a_method_fails_where_runs_failed_but_not_where_they_were_skipped():
     broken = runs("broken", 0.1, failed={1: "failed: ValueError"})
     skipped = runs("skipped", 0.1, failed={1: "skipped: no sensor"})

@@ -131,6 +131,17 @@ def test_a_heat_map_gives_ratios_to_the_best_and_words_for_failures():
     assert not found["text"][0][1].endswith("*")
 
 
+def test_an_idealised_method_is_marked_and_not_the_best():
+    rows = noisy_frame(
+        {"ideal": 0.1, "real": 1.0, "poor": 2.0},
+        spread=0.0,
+        ideal={"idealised": ("wheel_acceleration_front",)},
+    )
+    found = content.heat_map(rows, "mu_front")
+    assert found["methods"] == ["ideal†", "real", "poor"]
+    np.testing.assert_allclose([line[0] for line in found["ratio"]], [0.1, 1.0, 2.0])
+
+
 def test_boards_are_of_all_methods_and_of_each_set_of_instruments():
     rows = noisy_frame({"a": 1.0, "b": 2.0}, b={"sensors": ("accel_x",)})
     found = content.found_boards(rows, ["mu_front"])

@@ -19,7 +19,7 @@ from gripbench.bench.figures.style import axis_scale
 from gripbench.bench.presentation import significant
 from gripbench.bench.ranking import Board, boards
 from gripbench.bench.registry import load_suite, suite_files
-from gripbench.bench.summary import failures, summary
+from gripbench.bench.summary import failures, marked, summary
 from gripbench.bench.tables import Column, Table
 from gripbench.envs.signals import signal
 from gripbench.errors import InputError
@@ -115,12 +115,17 @@ def found_boards(rows: pd.DataFrame, targets: Sequence[str]) -> list[Board]:
 
 
 def heat_map(rows: pd.DataFrame, target: str) -> dict[str, Any]:
-    """Return the RMS of every method in every scenario, and its ratio to the scenario's best."""
+    """Return the RMS of every method in every scenario, and its ratio to the scenario's best.
+
+    The best is sought among the methods that read no idealised channel.
+    """
     lines = summary(rows[rows["target"] == target])
     scenarios = list(dict.fromkeys(lines["scenario"]))
     labels = list(dict.fromkeys(lines["label"]))
     cells = {(line["label"], line["scenario"]): line for _, line in lines.iterrows()}
-    best = lines.groupby("scenario")["rms"].min()
+    real = lines[lines["idealised"] == ""]
+    best = (lines if real.empty else real).groupby("scenario")["rms"].min()
+    names = dict(zip(lines["label"], lines["idealised"], strict=True))
     factor = axis_scale(target)[0]
     ratio: list[list[float | None]] = []
     text: list[list[str]] = []
@@ -133,11 +138,16 @@ def heat_map(rows: pd.DataFrame, target: str) -> dict[str, Any]:
             shown = "" if line is None else _words(str(line["status"]))
             if known and line is not None:
                 shown = significant(factor * line["rms"]) + ("*" if line["status"] else "")
-                ratio[-1].append(_ratio(line["rms"], best[scenario]))
+                ratio[-1].append(_ratio(line["rms"], best.get(scenario, math.nan)))
             else:
                 ratio[-1].append(None)
             text[-1].append(shown)
-    return {"scenarios": scenarios, "methods": labels, "ratio": ratio, "text": text}
+    return {
+        "scenarios": scenarios,
+        "methods": [marked(label, names[label]) for label in labels],
+        "ratio": ratio,
+        "text": text,
+    }
 
 
 def _words(status: str) -> str:

@@ -151,7 +151,7 @@
     const map = data.maps[target];
     const top = 30; // ratios beyond this are all equally bad
     const z = map.ratio.map((row) => row.map((value) =>
-      value === null ? null : Math.log10(Math.min(value, top))));
+      value === null ? null : Math.log10(Math.min(Math.max(value, 1), top))));
     byId("map-plot").style.height = `${Math.max(16, 9 + 2.2 * map.methods.length)}rem`;
     byId("map-plot").style.minWidth = `${20 + 4.2 * map.scenarios.length}rem`;
     const names = map.scenarios.map((name) => name.replaceAll("_", " "));
