@@ -83,13 +83,13 @@ def _imported_names(path: Path) -> Iterator[str]:
         tree = ast.parse(path.read_bytes(), str(path))
     except (SyntaxError, ValueError):
         return  # loading the file will say what is wrong
-    short = {"gripbench"}
-    for node in ast.walk(tree):
+    short: set[str] = set()
+    for node in _statements(tree):
         if isinstance(node, ast.Import):
             for alias in node.names:
-                if alias.name == "gripbench":
-                    short.add(alias.asname or alias.name)
-                else:
+                if alias.name.split(".")[0] == "gripbench":
+                    short.add(alias.asname or "gripbench")
+                if alias.name != "gripbench":
                     yield from _prefixes(alias.name)
         elif isinstance(node, ast.ImportFrom):
             base = _base(node, path)
@@ -100,7 +100,7 @@ def _imported_names(path: Path) -> Iterator[str]:
             yield from _prefixes(base)
             for alias in node.names:
                 yield f"{base}.{alias.name}" if base else alias.name
-    for node in ast.walk(tree):
+    for node in ast.walk(tree) if short else ():
         if (
             isinstance(node, ast.Attribute)
             and isinstance(node.value, ast.Name)
@@ -108,6 +108,18 @@ def _imported_names(path: Path) -> Iterator[str]:
             and node.attr in gripbench.DEFINED_IN
         ):
             yield gripbench.DEFINED_IN[node.attr]
+
+
+def _statements(tree: ast.Module) -> Iterator[ast.AST]:
+    """Yield every statement, however deep; expressions, the most of a tree, hold no imports."""
+    waiting: list[ast.AST] = [tree]
+    while waiting:
+        node = waiting.pop()
+        yield node
+        for name in ("body", "orelse", "finalbody", "handlers", "cases"):
+            inside = getattr(node, name, None)
+            if isinstance(inside, list):
+                waiting.extend(inside)
 
 
 def _base(node: ast.ImportFrom, path: Path) -> str:

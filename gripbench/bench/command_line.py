@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import importlib
 import pkgutil
 import sys
@@ -29,6 +30,7 @@ def application() -> typer.Typer:
 
 def main() -> None:
     """Run the command line; end with 2 on wrong usage or input, 130 when interrupted."""
+    gc.set_threshold(200_000)  # thousands of stored rows are read: looking for cycles costs as much
     try:
         code = application()(standalone_mode=False)
     except GripbenchError as error:

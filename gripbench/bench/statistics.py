@@ -18,10 +18,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from statistics import NormalDist
 
 import numpy as np
 import numpy.typing as npt
-from scipy import special  # not scipy.stats, which takes longer to import than most runs to rank
 
 from gripbench.errors import InputError
 
@@ -156,6 +156,8 @@ def p_better(scores: Scores, margin: float = 0.0) -> Floats:
 
 def _p_below_zero(differences: Floats, errors: Floats, runs: int) -> Floats:
     """One-sided p-values; equal but for rounding counts as equal, whatever the error."""
+    from scipy.special import stdtr  # slow to import, and `gripbench run` tests nothing
+
     same = np.abs(differences) < INDISTINGUISHABLE
     statistic = np.divide(
         differences,
@@ -163,7 +165,7 @@ def _p_below_zero(differences: Floats, errors: Floats, runs: int) -> Floats:
         out=np.where(differences < 0.0, -np.inf, np.inf),
         where=errors > INDISTINGUISHABLE,
     )
-    return np.where(same, 1.0, special.stdtr(runs - 1, statistic))
+    return np.where(same, 1.0, stdtr(runs - 1, statistic))
 
 
 def _unbiased(deviations: Floats, runs: int) -> Floats:
@@ -277,10 +279,12 @@ def interval(
     estimate: Floats, errors: Floats, runs: int, confidence: float = CONFIDENCE
 ) -> tuple[Floats, Floats]:
     """Return the ends of Student's interval, NaN without two runs."""
+    from scipy.special import stdtrit
+
     if runs < 2:
         nothing = np.full(len(estimate), np.nan)
         return nothing, nothing
-    width = special.stdtrit(runs - 1, 0.5 + confidence / 2.0) * errors
+    width = stdtrit(runs - 1, 0.5 + confidence / 2.0) * errors
     return estimate - width, estimate + width
 
 
@@ -320,13 +324,16 @@ def pooled_rms_interval(
     drawn = draws(runs, resamples, seed)
     replicates = np.sqrt((drawn @ squares) / (drawn @ number))
     below = 0.5 * (np.mean(replicates < point) + np.mean(replicates <= point))
-    bias = special.ndtri(np.clip(below, 1.0 / resamples, 1.0 - 1.0 / resamples))
+    normal = NormalDist()
+    bias = normal.inv_cdf(min(max(float(below), 1.0 / resamples), 1.0 - 1.0 / resamples))
     without = np.sqrt(np.maximum(squares.sum() - squares, 0.0) / (number.sum() - number))
     influence = without.mean() - without
     influence /= np.abs(influence).max()
     acceleration = np.sum(influence**3) / (6.0 * np.sum(influence**2) ** 1.5)
-    normal = bias + special.ndtri([0.5 - confidence / 2.0, 0.5 + confidence / 2.0])
-    # one run that outweighs all others would turn the sign: the interval then ends at its limit
-    levels = special.ndtr(bias + normal / np.maximum(1.0 - acceleration * normal, 1e-12))
+    levels = []
+    for level in (0.5 - confidence / 2.0, 0.5 + confidence / 2.0):
+        shifted = bias + normal.inv_cdf(level)
+        # one run that outweighs all others would turn the sign: the interval then ends at its limit
+        levels.append(normal.cdf(bias + shifted / max(1.0 - float(acceleration) * shifted, 1e-12)))
     low, high = np.quantile(replicates, levels)
     return float(low), float(high)
