@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import sin
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -18,15 +17,22 @@ from gripbench.envs.longitudinal_plant import (
     TYRE_TYPE,
     compiled,
     evaluate_tyres,
+    gravity_along,
     plant_record,
     rates,
 )
-from gripbench.envs.profiles import Segment, breakpoints, profile_value, segment_records
+from gripbench.envs.profiles import (
+    Segment,
+    breakpoints,
+    profile_value,
+    profile_values,
+    segment_records,
+)
 from gripbench.envs.scenarios import Scenario
 from gripbench.envs.signals import record_type
 from gripbench.envs.simulation import Action, Lanes, Simulation
 from gripbench.envs.tyres import slip_ratio
-from gripbench.envs.vehicles import GRAVITY, Vehicle
+from gripbench.envs.vehicles import Vehicle
 from gripbench.errors import GripbenchError
 
 PAPER_SOLVER = "paper"
@@ -112,10 +118,13 @@ TRUTH_TYPE = record_type(
 
 
 @compiled
-def _write_truth(time, x, inputs, plant, tyres, dx, truth):  # type: ignore[no-untyped-def]
+def _write_truth(time, x, inputs, plant, tyres, truth):  # type: ignore[no-untyped-def]
     force_front = inputs.mu_front * plant.load_front * tyres.front
     force_rear = inputs.mu_rear * plant.load_rear * tyres.rear
-    rates(x, force_front, force_rear, inputs, plant, dx)
+    gravity = gravity_along(inputs)
+    speed_rate, front_rate, rear_rate = rates(
+        x[0], x[1], x[2], force_front, force_rear, gravity, inputs, plant
+    )
     truth.time = time
     truth.speed_x = x[0]
     truth.wheel_speed_front = x[1]
@@ -130,10 +139,10 @@ def _write_truth(time, x, inputs, plant, tyres, dx, truth):  # type: ignore[no-u
     truth.utilisation = abs(force_front + force_rear) / limit
     truth.torque_front = inputs.torque_front
     truth.torque_rear = inputs.torque_rear
-    truth.speed_x_rate = dx[0]
-    truth.accel_x = dx[0] - GRAVITY * sin(inputs.road_grade)
-    truth.wheel_acceleration_front = dx[1]
-    truth.wheel_acceleration_rear = dx[2]
+    truth.speed_x_rate = speed_rate
+    truth.accel_x = speed_rate - gravity
+    truth.wheel_acceleration_front = front_rate
+    truth.wheel_acceleration_rear = rear_rate
     truth.road_grade = inputs.road_grade
 
 
@@ -146,7 +155,7 @@ def _advance(  # type: ignore[no-untyped-def]
     x[1] *= 1.0 + jumps[0]
     x[2] *= 1.0 + jumps[1]
     evaluate_tyres(x, plant, tyres)
-    _write_truth((k + 1) * sample_time, x, inputs, plant, tyres, work[9], truth)
+    _write_truth((k + 1) * sample_time, x, inputs, plant, tyres, truth)
     return step
 
 
@@ -162,36 +171,36 @@ def _command(k, sample_time, front, rear, friction, grade, inputs):  # type: ign
 
 @compiled
 def _run(  # type: ignore[no-untyped-def]
-    sample_time, x, step, inputs, plant, integrator, profiles, grade, jumps, tyres, work, truth
+    sample_time, x, step, inputs, plant, integrator, profiles, jumps, tyres, work, truth
 ):
-    front, rear, friction = profiles
-    for k in range(truth.shape[0] - 1):
-        _command(k, sample_time, front, rear, friction, grade, inputs[0])
+    """Run to the end; `inputs` holds the road grade, the profiles give all else."""
+    count = truth.shape[0] - 1
+    middles = (np.arange(count) + 0.5) * sample_time
+    front = profile_values(middles, profiles[0])
+    rear = profile_values(middles, profiles[1])
+    friction = profile_values(middles, profiles[2])
+    now = inputs[0]
+    for k in range(count):
+        now.torque_front = front[k]
+        now.torque_rear = rear[k]
+        now.mu_front = friction[k]
+        now.mu_rear = friction[k]
         step = _advance(
-            k,
-            sample_time,
-            x,
-            step,
-            inputs[0],
-            plant[0],
-            integrator,
-            jumps[k],
-            tyres[0],
-            work,
+            k, sample_time, x, step, now, plant[0], integrator, jumps[k], tyres[0], work,
             truth[k + 1],
-        )
+        )  # fmt: skip
 
 
 @compiled
 def _sampled_truth(  # type: ignore[no-untyped-def]
-    times, states, inputs, plant, profiles, grade, tyres, work, truth
+    times, states, inputs, plant, profiles, grade, tyres, truth
 ):
     front, rear, friction = profiles
     last = times[-1] - 1e-12  # profiles end at the horizon; its sample belongs to their inside
     for k in range(times.shape[0]):
         set_inputs(inputs[0], min(times[k], last), front, rear, friction, grade)
         evaluate_tyres(states[k], plant[0], tyres[0])
-        _write_truth(times[k], states[k], inputs[0], plant[0], tyres[0], work[9], truth[k])
+        _write_truth(times[k], states[k], inputs[0], plant[0], tyres[0], truth[k])
 
 
 class LongitudinalSimulation(Simulation):
@@ -241,7 +250,7 @@ class LongitudinalSimulation(Simulation):
         self._set_start_inputs()
         plant, tyres = self._plant[0], self._tyres[0]
         evaluate_tyres(self._x, plant, tyres)
-        _write_truth(0.0, self._x, self._inputs[0], plant, tyres, self._work[9], truth[0])
+        _write_truth(0.0, self._x, self._inputs[0], plant, tyres, truth[0])
         return truth
 
     def drive(self) -> npt.NDArray[np.float64]:
@@ -294,7 +303,6 @@ class LongitudinalSimulation(Simulation):
             self._plant,
             self._integrator,
             self._profiles,
-            self.scenario.road_grade,
             self._draw(self.scenario.steps),
             self._tyres,
             self._work,
@@ -360,7 +368,6 @@ class LongitudinalSimulation(Simulation):
             self._profiles,
             scenario.road_grade,
             self._tyres,
-            self._work,
             truth,
         )
         return truth

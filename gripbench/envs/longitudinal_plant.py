@@ -39,8 +39,10 @@ PLANT_PARAMETERS = (
     "magic_e",
 )
 
+_RECIPROCALS = ("per_mass", "per_inertia", "lever")
+
 PLANT_TYPE = np.dtype(
-    [(name, np.float64) for name in (*PLANT_PARAMETERS, "load_front", "load_rear")]
+    [(name, np.float64) for name in (*PLANT_PARAMETERS, "load_front", "load_rear", *_RECIPROCALS)]
 )
 
 INPUT_TYPE = np.dtype(
@@ -73,6 +75,9 @@ def plant_record(vehicle: dict[str, float]) -> np.ndarray:
     wheelbase = given["cg_to_front"] + given["cg_to_rear"]
     plant["load_front"] = weight * given["cg_to_rear"] / wheelbase
     plant["load_rear"] = weight * given["cg_to_front"] / wheelbase
+    plant["per_mass"] = 1.0 / given["mass"]
+    plant["per_inertia"] = 1.0 / given["wheel_inertia"]
+    plant["lever"] = given["wheel_radius"] / given["wheel_inertia"]
     return plant
 
 
@@ -100,18 +105,45 @@ def tyre_force(wheel_speed, speed, mu, load, plant):  # type: ignore[no-untyped-
 
 
 @_inline
-def rates(x, force_front, force_rear, inputs, plant, dx):  # type: ignore[no-untyped-def]
-    """Write the time derivative of the state for given tyre forces [N], eq. 2-3."""
-    radius, inertia = plant.wheel_radius, plant.wheel_inertia
-    gravity = GRAVITY * sin(inputs.road_grade) if inputs.road_grade != 0.0 else 0.0
-    dx[0] = (
-        (force_front + force_rear) / plant.mass
-        - plant.rolling_resistance * GRAVITY * _fade(x[0])
-        - plant.drag * x[0] * abs(x[0]) / plant.mass
+def gravity_along(inputs):  # type: ignore[no-untyped-def]
+    """Return gravity's component along the road [m/s^2], positive downhill."""
+    return GRAVITY * sin(inputs.road_grade)
+
+
+@_inline
+def rates(speed, front, rear, force_front, force_rear, gravity, inputs, plant):  # type: ignore[no-untyped-def]
+    """Return the time derivative of the state for given tyre forces, eq. 2-3.
+
+    Parameters
+    ----------
+    speed, front, rear
+        The state: velocity [m/s] and the axles' angular velocities [rad/s].
+    force_front, force_rear
+        Longitudinal tyre forces [N].
+    gravity
+        Gravity's component along the road [m/s^2], see `gravity_along`.
+    inputs, plant
+        Records of `INPUT_TYPE` and `PLANT_TYPE`.
+    """
+    radius = plant.wheel_radius
+    speed_rate = (
+        (force_front + force_rear - plant.drag * speed * abs(speed)) * plant.per_mass
+        - plant.rolling_resistance * GRAVITY * _fade(speed)
         + gravity
     )
-    dx[1] = (_wheel_torque(inputs.torque_front, x[1], radius) - force_front * radius) / inertia
-    dx[2] = (_wheel_torque(inputs.torque_rear, x[2], radius) - force_rear * radius) / inertia
+    torque_front = _wheel_torque(inputs.torque_front, front, radius)
+    torque_rear = _wheel_torque(inputs.torque_rear, rear, radius)
+    front_rate = torque_front * plant.per_inertia - force_front * plant.lever
+    rear_rate = torque_rear * plant.per_inertia - force_rear * plant.lever
+    return speed_rate, front_rate, rear_rate
+
+
+@_inline
+def state_rates(speed, front, rear, gravity, inputs, plant):  # type: ignore[no-untyped-def]
+    """Return the time derivative of the state, eq. 2-5; arguments as for `rates`."""
+    force_front = tyre_force(front, speed, inputs.mu_front, plant.load_front, plant)
+    force_rear = tyre_force(rear, speed, inputs.mu_rear, plant.load_rear, plant)
+    return rates(speed, front, rear, force_front, force_rear, gravity, inputs, plant)
 
 
 @compiled
@@ -129,9 +161,7 @@ def derivatives(x, inputs, plant, dx):  # type: ignore[no-untyped-def]
     dx
         Output, shape (3,).
     """
-    force_front = tyre_force(x[1], x[0], inputs.mu_front, plant.load_front, plant)
-    force_rear = tyre_force(x[2], x[0], inputs.mu_rear, plant.load_rear, plant)
-    rates(x, force_front, force_rear, inputs, plant, dx)
+    dx[0], dx[1], dx[2] = state_rates(x[0], x[1], x[2], gravity_along(inputs), inputs, plant)
 
 
 @_inline
@@ -156,29 +186,38 @@ def _torque_slope(torque, wheel_speed, radius):  # type: ignore[no-untyped-def]
     return 0.0 if torque >= 0.0 else torque * radius * _fade_slope(wheel_speed * radius)
 
 
-@compiled
-def linearise(x, inputs, plant, tyres, dx, jac):  # type: ignore[no-untyped-def]
-    """Write the derivative and its Jacobian, shape (3, 3): an arrow, the axles do not couple.
+@_inline
+def jacobian(speed, front, rear, inputs, plant, tyres):  # type: ignore[no-untyped-def]
+    """Return the Jacobian of the time derivative: an arrow, because the axles do not couple.
 
-    `tyres` is the record of `TYRE_TYPE` that belongs to the state; other arguments as for
-    `derivatives`.
+    Parameters
+    ----------
+    speed, front, rear
+        The state.
+    inputs, plant
+        Records of `INPUT_TYPE` and `PLANT_TYPE`.
+    tyres
+        Record of `TYRE_TYPE` that belongs to the state.
+
+    Returns
+    -------
+    The elements (0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (2, 0) and (2, 2); the others are zero.
     """
-    front = inputs.mu_front * plant.load_front
-    rear = inputs.mu_rear * plant.load_rear
-    rates(x, front * tyres.front, rear * tyres.rear, inputs, plant, dx)
-    front_w, front_v = front * tyres.front_wheel, front * tyres.front_speed
-    rear_w, rear_v = rear * tyres.rear_wheel, rear * tyres.rear_speed
-    radius, inertia = plant.wheel_radius, plant.wheel_inertia
-    jac[0, 0] = (
-        (front_v + rear_v) / plant.mass
-        - plant.rolling_resistance * GRAVITY * _fade_slope(x[0])
-        - 2.0 * plant.drag * abs(x[0]) / plant.mass
+    peak_front = inputs.mu_front * plant.load_front
+    peak_rear = inputs.mu_rear * plant.load_rear
+    front_wheel, front_speed = peak_front * tyres.front_wheel, peak_front * tyres.front_speed
+    rear_wheel, rear_speed = peak_rear * tyres.rear_wheel, peak_rear * tyres.rear_speed
+    radius = plant.wheel_radius
+    drag_slope = 2.0 * plant.drag * abs(speed)
+    brake_front = _torque_slope(inputs.torque_front, front, radius)
+    brake_rear = _torque_slope(inputs.torque_rear, rear, radius)
+    return (
+        (front_speed + rear_speed - drag_slope) * plant.per_mass
+        - plant.rolling_resistance * GRAVITY * _fade_slope(speed),
+        front_wheel * plant.per_mass,
+        rear_wheel * plant.per_mass,
+        -front_speed * plant.lever,
+        brake_front * plant.per_inertia - front_wheel * plant.lever,
+        -rear_speed * plant.lever,
+        brake_rear * plant.per_inertia - rear_wheel * plant.lever,
     )
-    jac[0, 1] = front_w / plant.mass
-    jac[0, 2] = rear_w / plant.mass
-    jac[1, 0] = -front_v * radius / inertia
-    jac[1, 1] = (_torque_slope(inputs.torque_front, x[1], radius) - front_w * radius) / inertia
-    jac[1, 2] = 0.0
-    jac[2, 0] = -rear_v * radius / inertia
-    jac[2, 1] = 0.0
-    jac[2, 2] = (_torque_slope(inputs.torque_rear, x[2], radius) - rear_w * radius) / inertia

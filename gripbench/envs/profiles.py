@@ -48,6 +48,15 @@ def breakpoints(segments: tuple[Segment, ...]) -> set[float]:
     return {time for s in segments for time in (s.start, s.end)}
 
 
+@numba.njit(inline="always", error_model="numpy")
+def _piece_value(time, piece):  # type: ignore[no-untyped-def]
+    share = (time - piece.start) / (piece.end - piece.start)
+    value = piece.first + (piece.last - piece.first) * share
+    if piece.amplitude != 0.0:
+        value += piece.amplitude * sin(2.0 * pi * (time - piece.start) / piece.period)
+    return value
+
+
 @numba.njit(cache=True, error_model="numpy", nogil=True)
 def profile_value(time, segments):  # type: ignore[no-untyped-def]
     """Return the value of a profile; at a jump, the value after it."""
@@ -55,8 +64,18 @@ def profile_value(time, segments):  # type: ignore[no-untyped-def]
     for i in range(segments.shape[0]):
         piece = segments[i]
         if piece.start <= time < piece.end:
-            share = (time - piece.start) / (piece.end - piece.start)
-            value += piece.first + (piece.last - piece.first) * share
-            if piece.amplitude != 0.0:
-                value += piece.amplitude * sin(2.0 * pi * (time - piece.start) / piece.period)
+            value += _piece_value(time, piece)
     return value
+
+
+@numba.njit(cache=True, error_model="numpy", nogil=True)
+def profile_values(times, segments):  # type: ignore[no-untyped-def]
+    """Return the values of a profile at ascending times, the bytes of `profile_value`."""
+    values = np.zeros(times.shape[0])
+    for i in range(segments.shape[0]):
+        piece = segments[i]
+        begin = np.searchsorted(times, piece.start)
+        end = np.searchsorted(times, piece.end)
+        for k in range(begin, end):
+            values[k] += _piece_value(times[k], piece)
+    return values

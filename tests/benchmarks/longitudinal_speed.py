@@ -14,7 +14,7 @@ from gripbench.envs.longitudinal_plant import (
     TYRE_TYPE,
     derivatives,
     evaluate_tyres,
-    linearise,
+    jacobian,
     plant_record,
 )
 from gripbench.envs.profiles import breakpoints, profile_value, segment_records
@@ -113,13 +113,15 @@ def _compiled_slope(profiles, grade, end):
         derivatives(x, inputs[0], PLANT[0], dx)
         return dx.copy()
 
-    def jacobian(t, x):
+    def slopes(t, x):
         set_inputs(t)
         evaluate_tyres(x, PLANT[0], tyres[0])
-        linearise(x, inputs[0], PLANT[0], tyres[0], dx, jac)
+        (
+            jac[0, 0], jac[0, 1], jac[0, 2], jac[1, 0], jac[1, 1], jac[2, 0], jac[2, 2],
+        ) = jacobian(*x, inputs[0], PLANT[0], tyres[0])  # fmt: skip
         return jac.copy()
 
-    return slope, jacobian
+    return slope, slopes
 
 
 def _plain_slope(profiles, grade, end):
