@@ -74,6 +74,19 @@ def bounded(value: float, low: float, high: float, factor: float = 1.0) -> str:
     return f"{text} [{significant(factor * low)}, {significant(factor * high)}]"
 
 
+def seconds(value: float, low: float, high: float) -> str:
+    """Return a time [s] with its interval where it has one, to a hundredth.
+
+    Examples
+    --------
+    >>> seconds(0.0195, 0.0098, 0.031), seconds(float("nan"), float("nan"), float("nan"))
+    ('0.02 [0.01, 0.03]', '-')
+    """
+    if not math.isfinite(value):
+        return "-"
+    return f"{value:.2f}" + (f" [{low:.2f}, {high:.2f}]" if math.isfinite(low) else "")
+
+
 def cell(line: pd.Series, factor: float = 1.0) -> str:
     """Return the text of one line of a summary: RMS times a factor, interval, what failed."""
     parts = []
@@ -162,7 +175,7 @@ def _response(line: pd.Series, factor: float) -> tuple[str, str, str]:
         return "not excited", "", ""
     return (
         bounded(line["excited_rms"], line["excited_low"], line["excited_high"], factor),
-        bounded(line["delay"], line["delay_low"], line["delay_high"]),
+        seconds(line["delay"], line["delay_low"], line["delay_high"]),
         f"{line['settled']:.0f}/{line['excited']:.0f}",
     )
 
@@ -178,7 +191,7 @@ def _jumps(part: pd.DataFrame) -> Table:
         for _, line in lines.iterrows():
             table.add_row(
                 f"  {marked(line['label'], line['idealised'])}",
-                bounded(line["jump_delay"], line["jump_low"], line["jump_high"]),
+                seconds(line["jump_delay"], line["jump_low"], line["jump_high"]),
                 f"{line['jump_settled']:.0f}/{line['jumps']:.0f}",
             )
     return table
