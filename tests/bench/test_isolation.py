@@ -5,6 +5,7 @@ import subprocess
 import sys
 import time
 
+import pandas as pd
 import pytest
 
 import gripbench
@@ -15,11 +16,11 @@ from gripbench.errors import InputError
 FAULTS = {
     "Sound": ("ok", ""),
     "Raises": ("failed", "ValueError: no luck (in fault, faulty.py:"),
-    "Hangs": ("timeout", "stopped after the time limit of 6 s"),
+    "Hangs": ("timeout", "stopped after the time limit of 1 s"),
     "Exits": ("failed", "its process exited with code 0"),
     "Leaves": ("failed", "SystemExit: 3"),
     "Crashes": ("failed", "its process was killed by SIGSEGV"),
-    "Hoards": ("failed", "out of memory (limit 600 MiB)"),
+    "Hoards": ("failed", "out of memory (limit 300 MiB)"),
     "NotANumber": ("diverged", "mu_front is nan from t = 0.099 s"),
     "Infinite": ("diverged", "mu_front is too large to be squared"),
     "Peeks": ("failed", "peeks reads the channel 'speed_gps', which is not among its sensors"),
@@ -32,34 +33,25 @@ FAULTS = {
 }
 
 
-@pytest.fixture(scope="module")
-def faulty_rows(tmp_path_factory, plugins):
-    folder = tmp_path_factory.mktemp("faults")
-    scenario = gripbench.load_scenario("constant_mu").model_copy(update={"horizon": 1.0})
-    return gripbench.run(
-        scenarios=[scenario],
-        methods=["slip_slope", *(f"{plugins}/faulty.py:{name}" for name in FAULTS)],
-        results=folder,
-        workers=1,
-        time_limit=6.0,
-        memory_limit=600,
-    )
-
-
-@pytest.mark.parametrize("fault", FAULTS)
-def test_each_fault_costs_one_cell_and_says_why(faulty_rows, plugins, fault):
-    names = "".join(f"_{c.lower()}" if c.isupper() else c for c in fault).lstrip("_")
-    row = faulty_rows[faulty_rows["label"] == names].iloc[0]
-    status, reason = FAULTS[fault]
-    assert row["status"] == status
-    assert row["reason"].startswith(reason)
-    assert "\n" not in row["reason"]
-    assert row["target"] in ("mu_front", "")
-
-
-def test_the_others_run_on(faulty_rows):
-    assert (faulty_rows.loc[faulty_rows["label"] == "slip_slope", "status"] == "ok").all()
-    assert faulty_rows["label"].nunique() == len(FAULTS) + 1
+def test_each_fault_costs_one_cell_and_says_why(tmp_path, plugins):
+    scenario = gripbench.load_scenario("constant_mu").model_copy(update={"horizon": 0.2})
+    common = {"scenarios": [scenario], "results": tmp_path, "workers": 1, "memory_limit": 300}
+    others = [f"{plugins}/faulty.py:{name}" for name in FAULTS if name != "Hangs"]
+    rows = gripbench.run(methods=["slip_slope", *others], **common)
+    # a short limit for the one that hangs alone: a busy machine is slow to start the others
+    hanging = gripbench.run(methods=[f"{plugins}/faulty.py:Hangs"], time_limit=1.0, **common)
+    rows = pd.concat([rows, hanging])
+    found = rows.drop_duplicates("label").set_index("label")
+    assert found.loc["slip_slope", "status"] == "ok"
+    assert len(found) == len(FAULTS) + 1
+    wrong = {}
+    for fault, (status, reason) in FAULTS.items():
+        row = found.loc["".join(f"_{c.lower()}" if c.isupper() else c for c in fault).lstrip("_")]
+        if row["status"] != status or not row["reason"].startswith(reason):
+            wrong[fault] = (row["status"], row["reason"])
+    assert wrong == {}
+    assert not rows["reason"].str.contains("\n").any()
+    assert set(rows.loc[rows["label"] != "slip_slope", "target"]) <= {"mu_front", ""}
 
 
 def test_a_cage_is_usable_again_after_its_process_died(plugins):

@@ -67,7 +67,7 @@ class Hoards(Base):
     name = "hoards"
 
     def fault(self, obs):
-        self.hoard = [bytearray(10**8) for _ in range(40)]
+        self.hoard = [bytearray(10**7) for _ in range(400)]
 
 
 class NotANumber(Base):
