@@ -12,13 +12,21 @@ from gripbench.bench import leaderboard, method_pages
 from gripbench.bench.registry import built_in_methods
 
 ROOT = Path(__file__).parents[2]
-PAGES = ("index", "add-a-method", "add-a-scenario", "add-a-vehicle", "contract", "figures")
+PAGES = (
+    "README.md",
+    "docs/index.md",
+    "docs/add-a-method.md",
+    "docs/add-a-scenario.md",
+    "docs/add-a-vehicle.md",
+    "docs/contract.md",
+    "docs/figures.md",
+)
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 FILE = re.compile(r"# (\S+\.(?:py|toml))\n")
 
 
 def blocks(page):
-    return BLOCK.findall((ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8"))
+    return BLOCK.findall((ROOT / page).read_text(encoding="utf-8"))
 
 
 def script(page):
