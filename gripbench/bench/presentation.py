@@ -162,7 +162,7 @@ def _down(part: pd.DataFrame, factor: float, responds: bool) -> Table:
 
 def _blocks() -> Table:
     """Return an empty table without vertical lines: five columns stay within 120 characters."""
-    return Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
+    return Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False, show_edge=False)
 
 
 def _skipped(line: pd.Series) -> bool:

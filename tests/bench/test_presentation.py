@@ -68,7 +68,7 @@ def test_the_response_of_the_friction_has_its_columns():
     rows += [never, synthetic_rows.row("a", 0, None, "two", "mu",
                                        score=synthetic_rows.score(0.5, friction=jump))]  # fmt: skip
     text = text_of(rows)
-    line = next(line for line in text.splitlines() if line.startswith("   a"))
+    line = next(line for line in text.splitlines() if line.startswith("  a"))
     assert line.split() == ["a", "0.500", "[0.500,", "0.500]", "0.200", "[0.200,", "0.200]",
                             "1.50", "1/2"]  # fmt: skip
     assert "not excited" in text
