@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import pickle
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -257,7 +257,8 @@ def _copy_safe(subject: _Subject) -> None:
         raise _FailedError("update changes estimates that it returned before")
 
 
-def _finite_on_every_scenario(subject: _Subject) -> None:
+def _runs(subject: _Subject) -> Iterator[tuple[Recording, npt.NDArray[Any], npt.NDArray[Any]]]:
+    """Yield each recording with the samples that the method was run over, and its estimates."""
     fast = callable(getattr(subject.create(), "run", None))
     for recording in subject.recordings:
         observations = recording.observations if fast else recording.observations[:SLOW_SAMPLES]
@@ -270,7 +271,12 @@ def _finite_on_every_scenario(subject: _Subject) -> None:
             timed=False,
         )
         check_estimates(outcome.estimates, subject.declaration.outputs, len(observations))
-        _finite(subject, outcome.estimates, observations, f" in scenario {recording.scenario}")
+        yield recording, observations, outcome.estimates
+
+
+def _finite_on_every_scenario(subject: _Subject) -> None:
+    for recording, observations, estimates in _runs(subject):
+        _finite(subject, estimates, observations, f" in scenario {recording.scenario}")
 
 
 def _survives(
@@ -286,11 +292,12 @@ def _survives(
 def _variance_not_negative(subject: _Subject) -> None:
     if not subject.declaration.variances:
         raise _NotApplicableError("it declares no variance")
-    estimates = subject.estimates(subject.recordings[0].observations[:SLOW_SAMPLES])
-    for name in subject.declaration.variances:
-        lowest = float(np.min(estimates[name + VARIANCE]))
-        if not lowest >= 0.0:
-            raise _FailedError(f"{name}{VARIANCE} is as low as {lowest:g}")
+    for recording, _, estimates in _runs(subject):
+        for name in subject.declaration.variances:
+            lowest = float(np.min(estimates[name + VARIANCE]))
+            if not lowest >= 0.0:
+                where = f"in scenario {recording.scenario}"
+                raise _FailedError(f"{name}{VARIANCE} is as low as {lowest:g} {where}")
 
 
 def _online_and_batch_agree(subject: _Subject) -> None:

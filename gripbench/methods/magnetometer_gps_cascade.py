@@ -105,3 +105,13 @@ class MagnetometerGpsCascade(CompiledMethod):
     }
     state = CASCADE_STATE
     step = _step
+
+    @property
+    def expected_failures(self) -> dict[str, str]:
+        """Checks that a variant fails on purpose, with the reason."""
+        if self.settings["delay_handling"] != LARSEN:
+            return {}
+        return {
+            "variance_not_negative": "a single correction for the delay subtracts more than there "
+            "is; the variant shows how the formula diverges"
+        }

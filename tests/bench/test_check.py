@@ -214,6 +214,43 @@ def test_every_built_in_method_passes(name):
     assert failures(check_estimator(name)) == {}
 
 
+NUMERICAL = [name for name in CHECKS if name.startswith(("survives", "finite", "variance"))]
+
+
+@pytest.mark.parametrize("name", built_in_methods())
+def test_every_variant_passes_what_its_numbers_decide(name):
+    method = built_in_methods()[name]
+    found = {
+        variant: failures(check_estimator(name, variant=variant, checks=NUMERICAL))
+        for variant in {**method.variants, **method.sensors_of, **method.steps_of}
+    }
+    assert {variant: failed for variant, failed in found.items() if failed} == {}
+
+
+class NegativeAtSpeed(Sound):
+    def run(self, vehicle, observations):
+        import numpy as np
+
+        estimates = np.zeros(
+            len(observations), [("force_x_front", float), ("force_x_front_variance", float)]
+        )
+        estimates["force_x_front_variance"] = 50.0 - observations["speed_gps"]
+        return estimates
+
+
+def test_a_variance_is_looked_at_in_every_scenario():
+    check = "variance_not_negative"
+    assert check_estimator(NegativeAtSpeed, SCENARIO, checks=[check]) == {check: PASSED}
+    found = check_estimator(NegativeAtSpeed, (*SCENARIO, "large_torque"), checks=[check])[check]
+    assert "in scenario large_torque" in found
+
+
+def test_a_variant_that_diverges_on_purpose_says_so():
+    found = check_estimator("magnetometer_gps_cascade:single_delay", checks=NUMERICAL)
+    assert found["variance_not_negative"].startswith(EXPECTED)
+    assert failures(found) == {}
+
+
 def test_an_expected_failure_is_told_with_its_reason():
     class Declared(NegativeVariance):
         expected_failures = {"variance_not_negative": "shows what goes wrong"}
