@@ -39,7 +39,7 @@ PAPER_SOLVER = "paper"
 
 _FULL_TORQUE = 5000.0
 _FIRST_STEP = 1e-5  # of the integrator [s]; it then chooses its own
-_CHUNK = 1024  # process noise is drawn ahead in blocks; the stream is the same for any size
+NOISE_BLOCK = 1024  # process noise is drawn ahead in blocks; the stream is the same for any size
 
 
 class TorqueDriver(Configuration):
@@ -147,7 +147,7 @@ def _write_truth(time, x, inputs, plant, tyres, truth):  # type: ignore[no-untyp
 
 
 @compiled
-def _advance(  # type: ignore[no-untyped-def]
+def advance_one(  # type: ignore[no-untyped-def]
     k, sample_time, x, step, inputs, plant, integrator, jumps, tyres, work, truth
 ):
     """Advance from sample `k` to the next; `jumps` are the wheel speeds' relative jumps at it."""
@@ -160,7 +160,7 @@ def _advance(  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _command(k, sample_time, front, rear, friction, grade, inputs):  # type: ignore[no-untyped-def]
+def command(k, sample_time, front, rear, friction, grade, inputs):  # type: ignore[no-untyped-def]
     """Write what acts from sample `k` to the next: the profiles at the middle of the interval.
 
     A held mean is exact for a constant and second-order accurate for a slope; a jump of a profile
@@ -185,7 +185,7 @@ def _run(  # type: ignore[no-untyped-def]
         now.torque_rear = rear[k]
         now.mu_front = friction[k]
         now.mu_rear = friction[k]
-        step = _advance(
+        step = advance_one(
             k, sample_time, x, step, now, plant[0], integrator, jumps[k], tyres[0], work,
             truth[k + 1],
         )  # fmt: skip
@@ -264,12 +264,12 @@ class LongitudinalSimulation(Simulation):
         sample_time = self.scenario.sample_time
         front, rear, friction = self._profiles
         inputs = self._inputs[0]
-        _command(self._k, sample_time, front, rear, friction, self.scenario.road_grade, inputs)
+        command(self._k, sample_time, front, rear, friction, self.scenario.road_grade, inputs)
         inputs["torque_front"], inputs["torque_rear"] = action
         if len(self._pending) == 0:
-            self._pending = self._draw(_CHUNK)
+            self._pending = self._draw(NOISE_BLOCK)
         truth = np.zeros(1, TRUTH_TYPE)
-        self._step = _advance(
+        self._step = advance_one(
             self._k,
             sample_time,
             self._x,
@@ -320,8 +320,10 @@ class LongitudinalSimulation(Simulation):
         return {"friction_step": steps[0]} if steps else {}
 
     @classmethod
-    def together(cls, simulations: Sequence[LongitudinalSimulation]) -> LongitudinalLanes:
+    def together(cls, simulations: Sequence[LongitudinalSimulation]) -> Lanes:
         """Return runs that advance in one compiled call."""
+        from gripbench.envs.longitudinal_lanes import LongitudinalLanes
+
         return LongitudinalLanes(simulations)
 
     def _start(self) -> None:
@@ -371,114 +373,6 @@ class LongitudinalSimulation(Simulation):
             truth,
         )
         return truth
-
-
-class LongitudinalLanes(Lanes):
-    """Several runs of a longitudinal scenario, advanced in one compiled call."""
-
-    def __init__(self, simulations: Sequence[LongitudinalSimulation]) -> None:
-        super().__init__(simulations)
-        self._runs = simulations
-        count = len(simulations)
-        self._x = np.zeros((count, 3))
-        self._steps = np.zeros(count)
-        self._k = np.zeros(count, np.int64)
-        self._jumps = np.zeros((count, _CHUNK, 2))
-        self._tyres = np.zeros(count, TYRE_TYPE)
-        self._ended = [""] * count
-
-    @property
-    def terminations(self) -> list[str]:
-        """Why each lane has ended; empty while it goes on."""
-        return self._ended
-
-    def reset(self, lane: int, seed: int) -> npt.NDArray[Any]:
-        """Start a lane; return its first sample."""
-        run = self._runs[lane]
-        truth = run.reset(seed)
-        self._x[lane], self._steps[lane], self._k[lane] = run._x, run._step, 0
-        self._tyres[lane] = run._tyres[0]
-        self._ended[lane] = ""
-        return truth
-
-    def drive(self) -> npt.NDArray[np.float64]:
-        """Return the torques of the scenario's profiles in each lane."""
-        front, rear, _ = self._runs[0]._profiles
-        torques = np.empty((len(self._runs), 2))
-        _drive_lanes(self._k, self._runs[0].scenario.sample_time, front, rear, torques)
-        return torques
-
-    def advance(self, actions: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
-        """Hold the axle torques of each lane for one sample time."""
-        first = self._runs[0]
-        for lane in map(int, np.flatnonzero(self._k % _CHUNK == 0)):
-            self._jumps[lane] = self._runs[lane]._draw(_CHUNK)
-        truth = np.zeros(len(self._runs), TRUTH_TYPE)
-        _advance_lanes(
-            self._k,
-            first.scenario.sample_time,
-            self._x,
-            self._steps,
-            actions,
-            first._inputs,
-            first._plant,
-            first._integrator,
-            first._profiles,
-            first.scenario.road_grade,
-            self._jumps,
-            self._tyres,
-            first._work,
-            truth,
-        )
-        self._k += 1
-        for lane in map(int, np.flatnonzero(~np.isfinite(self._x).all(axis=1))):
-            self._ended[lane] = "diverged"
-        return truth
-
-
-@compiled
-def _drive_lanes(k, sample_time, front, rear, torques):  # type: ignore[no-untyped-def]
-    for lane in range(k.shape[0]):
-        middle = (k[lane] + 0.5) * sample_time
-        torques[lane, 0] = profile_value(middle, front)
-        torques[lane, 1] = profile_value(middle, rear)
-
-
-@compiled
-def _advance_lanes(  # type: ignore[no-untyped-def]
-    k,
-    sample_time,
-    x,
-    steps,
-    actions,
-    inputs,
-    plant,
-    integrator,
-    profiles,
-    grade,
-    jumps,
-    tyres,
-    work,
-    truth,
-):
-    front, rear, friction = profiles
-    for lane in range(x.shape[0]):
-        _command(k[lane], sample_time, front, rear, friction, grade, inputs[0])
-        inputs[0].torque_front = actions[lane, 0]
-        inputs[0].torque_rear = actions[lane, 1]
-        steps[lane] = _advance(
-            k[lane],
-            sample_time,
-            x[lane],
-            steps[lane],
-            inputs[0],
-            plant[0],
-            integrator,
-            jumps[lane, k[lane] % jumps.shape[1]],
-            tyres[lane],
-            work,
-            truth[lane],
-        )
 
 
 def _jump_stream(seed: int) -> np.random.Generator:

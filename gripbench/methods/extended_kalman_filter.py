@@ -21,19 +21,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from gripbench.envs.tyres import slip_ratio
 from gripbench.envs.vehicles import GRAVITY
 from gripbench.methods.axle_friction import (
     AXLE_FRICTION_PARAMETERS,
+    AXLE_FRICTION_STATE,
     AXLE_FRICTION_VEHICLE,
-    axle_friction,
+    axle_slips,
+    estimate_friction,
+    start_friction,
 )
 from gripbench.methods.contract import CompiledMethod, Parameter, compiled
 from gripbench.methods.kalman import correct_scalar, filter_type, predict
 from gripbench.methods.longitudinal_model import (
     RESISTANCE_PARAMETERS,
-    front_load,
-    rear_load,
 )
 from gripbench.methods.rls import MAGIC_FORMULA, PRINTED
 
@@ -43,8 +43,7 @@ STATE = np.dtype(
     [
         ("filter", filter_type(5)),
         *((name, np.float64) for name in ("time", "samples", "torque_front", "torque_rear")),
-        *((name, np.float64) for name in ("slope_front", "covariance_front")),
-        *((name, np.float64) for name in ("slope_rear", "covariance_rear")),
+        *((name, np.float64) for name in AXLE_FRICTION_STATE),
     ]
 )
 
@@ -52,8 +51,7 @@ STATE = np.dtype(
 @compiled
 def start(state, params):  # type: ignore[no-untyped-def]
     """Set the first covariances and the constant entries of the model."""
-    state.covariance_front = params.covariance
-    state.covariance_rear = params.covariance
+    start_friction(state, params)
     kalman = state.filter
     for i in range(5):
         kalman.F[i, i] = 1.0
@@ -105,30 +103,14 @@ def measure(kalman, accel_x, wheel_front, wheel_rear, speed, params):  # type: i
 @compiled
 def _finish(state, obs, elapsed, params, est):  # type: ignore[no-untyped-def]
     kalman = state.filter
-    slip_front = slip_ratio(params.wheel_radius * obs.wheel_speed_front, obs.speed_gps)
-    slip_rear = slip_ratio(params.wheel_radius * obs.wheel_speed_rear, obs.speed_gps)
+    slip_front, slip_rear = axle_slips(
+        obs.wheel_speed_front, obs.wheel_speed_rear, obs.speed_gps, params
+    )
     est.force_x_front = kalman.x[FORCE_FRONT]
     est.force_x_rear = kalman.x[FORCE_REAR]
     est.force_x_front_variance = kalman.P[FORCE_FRONT, FORCE_FRONT]
     est.force_x_rear_variance = kalman.P[FORCE_REAR, FORCE_REAR]
-    state.slope_front, state.covariance_front, est.mu_front = axle_friction(
-        state.slope_front,
-        state.covariance_front,
-        est.force_x_front,
-        slip_front,
-        front_load(params),
-        elapsed,
-        params,
-    )
-    state.slope_rear, state.covariance_rear, est.mu_rear = axle_friction(
-        state.slope_rear,
-        state.covariance_rear,
-        est.force_x_rear,
-        slip_rear,
-        rear_load(params),
-        elapsed,
-        params,
-    )
+    estimate_friction(state, est, slip_front, slip_rear, elapsed, params)
 
 
 @compiled

@@ -17,17 +17,17 @@ from math import expm1
 
 import numpy as np
 
-from gripbench.envs.tyres import slip_ratio
 from gripbench.methods.axle_friction import (
     AXLE_FRICTION_PARAMETERS,
+    AXLE_FRICTION_STATE,
     AXLE_FRICTION_VEHICLE,
-    axle_friction,
+    axle_slips,
+    estimate_friction,
+    start_friction,
 )
 from gripbench.methods.contract import CompiledMethod, Parameter, compiled
 from gripbench.methods.longitudinal_model import (
     RESISTANCE_PARAMETERS,
-    front_load,
-    rear_load,
     total_force,
 )
 from gripbench.methods.rls import MAGIC_FORMULA, PRINTED
@@ -38,10 +38,7 @@ _NAMES = (
     "wheel_speed_front",
     "wheel_speed_rear",
     "difference",
-    "slope_front",
-    "covariance_front",
-    "slope_rear",
-    "covariance_rear",
+    *AXLE_FRICTION_STATE,
 )
 STATE = np.dtype([(name, np.float64) for name in _NAMES])
 
@@ -49,8 +46,7 @@ STATE = np.dtype([(name, np.float64) for name in _NAMES])
 @compiled
 def start(state, params):  # type: ignore[no-untyped-def]
     """Set the first covariances."""
-    state.covariance_front = params.covariance
-    state.covariance_rear = params.covariance
+    start_friction(state, params)
 
 
 @compiled
@@ -74,26 +70,10 @@ def step(state, obs, params, est):  # type: ignore[no-untyped-def]
     half_difference = 0.5 * params.wheel_inertia * state.difference / params.wheel_radius
     est.force_x_front = half_total + half_difference
     est.force_x_rear = half_total - half_difference
-    slip_front = slip_ratio(params.wheel_radius * obs.wheel_speed_front, obs.speed_gps)
-    slip_rear = slip_ratio(params.wheel_radius * obs.wheel_speed_rear, obs.speed_gps)
-    state.slope_front, state.covariance_front, est.mu_front = axle_friction(
-        state.slope_front,
-        state.covariance_front,
-        est.force_x_front,
-        slip_front,
-        front_load(params),
-        elapsed,
-        params,
+    slip_front, slip_rear = axle_slips(
+        obs.wheel_speed_front, obs.wheel_speed_rear, obs.speed_gps, params
     )
-    state.slope_rear, state.covariance_rear, est.mu_rear = axle_friction(
-        state.slope_rear,
-        state.covariance_rear,
-        est.force_x_rear,
-        slip_rear,
-        rear_load(params),
-        elapsed,
-        params,
-    )
+    estimate_friction(state, est, slip_front, slip_rear, elapsed, params)
 
 
 class IndividualWheelAcceleration(CompiledMethod):

@@ -18,22 +18,24 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from gripbench.envs.tyres import slip_ratio
 from gripbench.methods.axle_friction import (
     AXLE_FRICTION_PARAMETERS,
+    AXLE_FRICTION_STATE,
     AXLE_FRICTION_VEHICLE,
-    axle_friction,
+    axle_slips,
+    estimate_friction,
+    start_friction,
 )
 from gripbench.methods.contract import CompiledMethod, Parameter, compiled
-from gripbench.methods.longitudinal_model import front_load, rear_load
 from gripbench.methods.rls import MAGIC_FORMULA, PRINTED
 
 _inline = numba.njit(inline="always", error_model="numpy")
 
-_AXLE = ("wheel_speed", "force", "measured", "torque", "slope", "covariance")
+_AXLE = ("wheel_speed", "force", "measured", "torque")
 STATE = np.dtype(
     [("time", np.float64), ("samples", np.float64)]
     + [(f"{name}_{axle}", np.float64) for axle in ("front", "rear") for name in _AXLE]
+    + [(name, np.float64) for name in AXLE_FRICTION_STATE]
 )
 
 
@@ -66,8 +68,7 @@ def observer(wheel_speed, force, measured, torque, elapsed, params):  # type: ig
 @compiled
 def start(state, params):  # type: ignore[no-untyped-def]
     """Set the first covariances."""
-    state.covariance_front = params.covariance
-    state.covariance_rear = params.covariance
+    start_friction(state, params)
 
 
 @compiled
@@ -99,28 +100,12 @@ def step(state, obs, params, est):  # type: ignore[no-untyped-def]
     state.samples += 1.0
     state.measured_front, state.measured_rear = obs.wheel_speed_front, obs.wheel_speed_rear
     state.torque_front, state.torque_rear = obs.torque_front, obs.torque_rear
-    slip_front = slip_ratio(params.wheel_radius * obs.wheel_speed_front, obs.speed_gps)
-    slip_rear = slip_ratio(params.wheel_radius * obs.wheel_speed_rear, obs.speed_gps)
-    state.slope_front, state.covariance_front, est.mu_front = axle_friction(
-        state.slope_front,
-        state.covariance_front,
-        state.force_front,
-        slip_front,
-        front_load(params),
-        elapsed,
-        params,
-    )
-    state.slope_rear, state.covariance_rear, est.mu_rear = axle_friction(
-        state.slope_rear,
-        state.covariance_rear,
-        state.force_rear,
-        slip_rear,
-        rear_load(params),
-        elapsed,
-        params,
+    slip_front, slip_rear = axle_slips(
+        obs.wheel_speed_front, obs.wheel_speed_rear, obs.speed_gps, params
     )
     est.force_x_front = state.force_front
     est.force_x_rear = state.force_rear
+    estimate_friction(state, est, slip_front, slip_rear, elapsed, params)
 
 
 class IndividualWheelTorque(CompiledMethod):

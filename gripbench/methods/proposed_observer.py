@@ -33,12 +33,14 @@ from math import expm1, sin, sqrt
 import numba
 import numpy as np
 
-from gripbench.envs.tyres import slip_ratio
 from gripbench.envs.vehicles import GRAVITY
 from gripbench.methods.axle_friction import (
     AXLE_FRICTION_PARAMETERS,
+    AXLE_FRICTION_STATE,
     AXLE_FRICTION_VEHICLE,
-    axle_friction,
+    axle_slips,
+    estimate_friction,
+    start_friction,
 )
 from gripbench.methods.contract import CompiledMethod, Parameter, compiled
 from gripbench.methods.longitudinal_model import (
@@ -63,10 +65,7 @@ _NAMES = (
     "wheel_speed_front",
     "wheel_speed_rear",
     "wheel_acceleration",
-    "slope_front",
-    "covariance_front",
-    "slope_rear",
-    "covariance_rear",
+    *AXLE_FRICTION_STATE,
 )
 STATE = np.dtype([(name, np.float64) for name in _NAMES])
 
@@ -138,8 +137,7 @@ def adapted_stiffness(stiffness, slip, force, elapsed, params):  # type: ignore[
 def start(state, params):  # type: ignore[no-untyped-def]
     """Set the first stiffness, C_s, and the first covariances."""
     state.stiffness = params.longitudinal_stiffness
-    state.covariance_front = params.covariance
-    state.covariance_rear = params.covariance
+    start_friction(state, params)
 
 
 @compiled
@@ -163,8 +161,7 @@ def _step(state, obs, wheel_acceleration, slip_speed, elapsed, params, est):  # 
     state.accel_x = obs.accel_x
     state.wheel_speed_front, state.wheel_speed_rear = obs.wheel_speed_front, obs.wheel_speed_rear
     speed = slip_speed if slip_speed >= 0.0 else state.speed
-    slip_front = slip_ratio(params.wheel_radius * obs.wheel_speed_front, speed)
-    slip_rear = slip_ratio(params.wheel_radius * obs.wheel_speed_rear, speed)
+    slip_front, slip_rear = axle_slips(obs.wheel_speed_front, obs.wheel_speed_rear, speed, params)
     share = rear_load(params) / front_load(params)
     force = total_force(obs.accel_x, speed, params)
     state.stiffness = adapted_stiffness(
@@ -173,24 +170,7 @@ def _step(state, obs, wheel_acceleration, slip_speed, elapsed, params, est):  # 
     est.speed_x = state.speed
     est.force_x_front = state.stiffness * slip_front
     est.force_x_rear = state.stiffness * share * slip_rear
-    state.slope_front, state.covariance_front, est.mu_front = axle_friction(
-        state.slope_front,
-        state.covariance_front,
-        est.force_x_front,
-        slip_front,
-        front_load(params),
-        elapsed,
-        params,
-    )
-    state.slope_rear, state.covariance_rear, est.mu_rear = axle_friction(
-        state.slope_rear,
-        state.covariance_rear,
-        est.force_x_rear,
-        slip_rear,
-        rear_load(params),
-        elapsed,
-        params,
-    )
+    estimate_friction(state, est, slip_front, slip_rear, elapsed, params)
 
 
 @compiled
