@@ -39,12 +39,13 @@ def run(
     suite
         Name or path of a suite; `scenarios` and `seeds` replace its own, `methods` come on top.
     scenarios
-        Names, paths of TOML files, or scenarios.
+        Names, paths of TOML files, `recording:NAME` or `recording:FOLDER`, or scenarios.
     methods
         Names (`name[:variant][@parameter=number,...]`), files (`file.py:Class`), classes, or
         instances.
     seeds
         Number of seeds from 0, `"A:B"` for A to B-1, or a range; by default the suite's, else 1.
+        The seeds of a recording are its windows, by default all of them.
     results
         Folder of the stored rows; what is there already is not run again.
     workers
@@ -103,6 +104,7 @@ def plan_of(
     """Return the plan that these choices make; see `run`."""
     chosen: list[Any] = list(scenarios)
     specs = []
+    all_windows = seeds is None
     if suite:
         loaded = load_suite(suite)
         chosen = chosen or list(loaded.scenarios)
@@ -120,6 +122,7 @@ def plan_of(
         ),
         methods=tuple(specs),
         seeds=seeds_of(seeds),
+        windows=None if all_windows else seeds_of(seeds),
     )
 
 

@@ -14,12 +14,12 @@ from gripbench.bench.cage import Cage, CellFailure, Limits
 from gripbench.bench.declarations import Declaration, Source, describe_error
 from gripbench.bench.execution import Outcome, SkippedError, execute, missing
 from gripbench.bench.fingerprints import versions
+from gripbench.bench.recorded_scenarios import RecordedScenario, judged, recording_of
 from gripbench.bench.registry import MethodSpec
 from gripbench.bench.rows import Row, Status
 from gripbench.bench.scoring import DivergedError, score, targets_of
 from gripbench.envs.recordings import Recording, select_channels
 from gripbench.envs.scenarios import Scenario
-from gripbench.envs.worlds import record
 
 
 @dataclass(frozen=True)
@@ -52,8 +52,11 @@ def run_tasks(tasks: tuple[Task, ...]) -> list[Row]:
 
 def run_task(task: Task) -> list[Row]:
     """Simulate a scenario once and run every method of the task over the recording."""
+    if isinstance(task.scenario, RecordedScenario) and task.scenario.absent:
+        reason = task.scenario.absent
+        return [_row(task, spec, key, (), "skipped", reason) for spec, key in task.methods]
     try:
-        recording = record(task.scenario, task.seed)
+        recording = recording_of(task.scenario, task.seed)
     except Exception as error:
         reason = f"the scenario could not be simulated: {describe_error(error)}"
         return [
@@ -76,6 +79,8 @@ def run_cell(task: Task, spec: MethodSpec, key: str, recording: Recording) -> Ro
         return _row(task, spec, key, targets, "skipped", reason)
     try:
         outcome = _outcome(task, spec, recording, period)
+        if isinstance(task.scenario, RecordedScenario):
+            recording = judged(recording, outcome.estimates)
         scores = score(outcome.estimates, declaration.outputs, targets, recording)
     except DivergedError as error:
         return _row(task, spec, key, targets, "diverged", str(error))

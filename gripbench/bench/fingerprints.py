@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import gripbench
+from gripbench.bench.recorded_scenarios import RecordedScenario
 from gripbench.envs import worlds
 from gripbench.envs.scenarios import Scenario
 from gripbench.envs.vehicles import load_vehicle
@@ -35,6 +36,8 @@ def versions() -> dict[str, str]:
 
 def scenario_digest(scenario: Scenario) -> str:
     """Return the digest of all that a recording depends on besides the seed."""
+    if isinstance(scenario, RecordedScenario):
+        return digest(scenario.content, scenario.absent, source_digest(_RECORDED))
     world = worlds.WORLDS[scenario.world]
     classes: tuple[Any, ...] = (world.scenario, world.simulation)
     files = [Path(inspect.getfile(item)) for item in classes]
@@ -47,6 +50,7 @@ def scenario_digest(scenario: Scenario) -> str:
     return digest(json.dumps(content, sort_keys=True), sources, inspect.getsource(worlds.record))
 
 
+_RECORDED = _PROJECT / "envs" / "logs" / "excitation.py"
 _RECORDING = ("sensors", "recordings", "vehicles", "simulation")
 
 

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
+from gripbench.bench.recorded_scenarios import PREFIX
 from gripbench.envs.signals import SIGNALS, signal
 from gripbench.errors import InputError, unknown
 
@@ -114,7 +115,8 @@ def on_board(
 
     Methods that share no scenario, not even by way of others, come in different parts: those of
     a longitudinal and of a lateral suite that estimate the same signal, say. Being skipped in a
-    scenario does not count as sharing it.
+    scenario does not count as sharing it. Each recording of a real vehicle is a part of its own:
+    its runs are windows of one drive, which have no counterpart in another scenario.
 
     Parameters
     ----------
@@ -140,8 +142,10 @@ def on_board(
     if ran.empty:
         raise InputError(f"{target}: every run was skipped")
     homes = ran.groupby("label")["scenario"].agg(set)
+    real = {name for name in ran["scenario"].unique() if name.startswith(PREFIX)}
+    simulated = _connected(home - real for home in homes if home - real)
     parts = []
-    for scenarios in _connected(homes):
+    for scenarios in [*simulated, *({name} for name in sorted(real))]:
         part = lines[lines["scenario"].isin(scenarios)]
         # what is at home in another part is a stranger here
         elsewhere = {label for label, home in homes.items() if not home & scenarios}

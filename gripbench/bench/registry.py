@@ -110,6 +110,8 @@ class MethodSpec:
         Whether it runs in a process of its own, as everything that is not built in.
     digest
         Digest of its source and settings.
+    shown
+        Label that tables show instead of the one that its settings make.
     """
 
     source: Source
@@ -118,10 +120,13 @@ class MethodSpec:
     parameters: dict[str, Any] = field(default_factory=dict)
     isolated: bool = True
     digest: str = ""
+    shown: str = ""
 
     @property
     def label(self) -> str:
         """Name that tables show: `name[:variant][@parameter=value,...]`."""
+        if self.shown:
+            return self.shown
         text = self.declaration.name
         if self.variant:
             text += f":{self.variant}"
@@ -327,13 +332,17 @@ def all_scenario_files() -> dict[str, Path]:
 
 
 def find_scenario(name: str) -> Scenario:
-    """Return a scenario by name or by the path of a TOML file.
+    """Return a scenario by name, by the path of a TOML file, or as `recording:NAME`.
 
     Raises
     ------
     InputError
         If there is no such scenario; the message names the nearest one.
     """
+    if name.startswith("recording:"):
+        from gripbench.bench.recorded_scenarios import recorded_scenario  # reads the log
+
+        return recorded_scenario(name)
     files = all_scenario_files()
     if name.endswith(".toml"):
         return load_scenario(name)

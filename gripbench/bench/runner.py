@@ -18,6 +18,7 @@ from gripbench.bench.backends import Backend, WorkerLostError
 from gripbench.bench.cage import Limits, end_declaring
 from gripbench.bench.cells import Task, close_cages, run_tasks
 from gripbench.bench.fingerprints import scenario_digest, scoring_digest, versions
+from gripbench.bench.recorded_scenarios import RecordedScenario, on_recording
 from gripbench.bench.registry import MethodSpec
 from gripbench.bench.rows import Row
 from gripbench.bench.store import DamagedRowError, Store
@@ -34,16 +35,27 @@ RETRIES = 3
 
 @dataclass(frozen=True)
 class Plan:
-    """What to run: every method on every seed of every scenario."""
+    """What to run: every method on every seed of every scenario.
+
+    Of a recording it is every window, or those of `windows` alone.
+    """
 
     scenarios: tuple[Scenario, ...]
     methods: tuple[MethodSpec, ...]
     seeds: range
+    windows: range | None = None
+
+    def seeds_of(self, scenario: Scenario) -> tuple[int, ...]:
+        """Return the seeds of a scenario; of a recording, its windows among those chosen."""
+        if not isinstance(scenario, RecordedScenario):
+            return tuple(self.seeds)
+        chosen = range(scenario.runs) if self.windows is None else self.windows
+        return tuple(seed for seed in chosen if seed < scenario.runs)
 
     @property
     def cells(self) -> int:
         """Number of rows that the plan ends with."""
-        return len(self.scenarios) * len(self.methods) * len(self.seeds)
+        return len(self.methods) * sum(len(self.seeds_of(item)) for item in self.scenarios)
 
 
 @dataclass
@@ -166,7 +178,7 @@ def _waiting(
 ) -> Iterator[_Waiting]:
     """Yield the cells that have no valid row; count and hand on the rows of the others."""
     for scenario in plan.scenarios:
-        for seed in plan.seeds:
+        for seed in plan.seeds_of(scenario):
             methods = []
             for index, method in enumerate(plan.methods):
                 if fresh:
@@ -220,16 +232,23 @@ def _chunks(
     plan: Plan, waiting: list[_Waiting], keys: Keys, limits: Limits
 ) -> Iterator[tuple[Task, ...]]:
     isolated = any(method.isolated for method in plan.methods)
+    local: dict[tuple[str, int], MethodSpec] = {}
+
+    def method_on(scenario: Scenario, index: int) -> MethodSpec:
+        if (scenario.name, index) not in local:
+            local[scenario.name, index] = on_recording(plan.methods[index], scenario)
+        return local[scenario.name, index]
+
     tasks = (
         Task(
             scenario=item.scenario,
             seed=item.seed,
             methods=tuple(
-                (plan.methods[index], _key(keys, item.scenario, index, item.seed))
+                (method_on(item.scenario, index), _key(keys, item.scenario, index, item.seed))
                 for index in item.methods
             ),
             limits=limits,
-            timed=item.seed == plan.seeds[0],
+            timed=item.seed == plan.seeds_of(item.scenario)[0],
         )
         for item in waiting
     )

@@ -20,6 +20,13 @@ def run(
     scenario: Annotated[
         list[str] | None, typer.Option(help="A scenario's name or TOML file; repeat for more.")
     ] = None,
+    recording: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="A published recording's name, or the folder of an imported one; its windows are "
+            "the seeds. Repeat for more."
+        ),
+    ] = None,
     method: Annotated[
         list[str] | None,
         typer.Option(
@@ -27,7 +34,13 @@ def run(
             "With a suite, they come on top of its methods."
         ),
     ] = None,
-    seeds: Annotated[str, typer.Option(help="N for seeds 0 to N-1, or A:B for A to B-1.")] = "",
+    seeds: Annotated[
+        str,
+        typer.Option(
+            help="N for seeds 0 to N-1, or A:B for A to B-1; by default the suite's, else 1, and "
+            "all windows of a recording."
+        ),
+    ] = "",
     workers: Annotated[int, typer.Option(min=0, help="Processes; 0: one a core.")] = 0,
     backend: Annotated[str, typer.Option(help="loky, dask or ray.")] = "loky",
     scheduler: Annotated[str, typer.Option(help="Address of a cluster's scheduler.")] = "",
@@ -47,13 +60,15 @@ def run(
     from gripbench.bench.api import limits_of, order_in, plan_of
     from gripbench.bench.backends import Backend
     from gripbench.bench.presentation import console, print_failures, print_summary, progress
+    from gripbench.bench.recorded_scenarios import PREFIX
     from gripbench.bench.registry import load_suite
     from gripbench.bench.rows import Row, frame_of
     from gripbench.bench.runner import run_plan
     from gripbench.bench.store import Store, write_atomically
     from gripbench.bench.summary import scores_csv, summary
 
-    plan = plan_of(suite, scenario or [], method or [], seeds or None)
+    chosen = [*(scenario or []), *(f"{PREFIX}{place}" for place in recording or [])]
+    plan = plan_of(suite, chosen, method or [], seeds or None)
     targets = load_suite(suite).targets if suite else ()
     rows: list[Row] = []
     with progress("running", plan.cells) as bar:

@@ -7,9 +7,9 @@ from typing import Any
 import numpy.typing as npt
 
 from gripbench.bench.execution import execute, missing
+from gripbench.bench.recorded_scenarios import on_recording, recording_of
 from gripbench.bench.registry import MethodSpec, choose_method, find_scenario
 from gripbench.envs.recordings import Recording
-from gripbench.envs.worlds import record
 from gripbench.errors import InputError
 
 
@@ -25,7 +25,7 @@ class Runs:
         """Return the recording of a scenario's run."""
         key = (scenario, seed)
         if key not in self._recordings:
-            self._recordings[key] = record(find_scenario(scenario), seed)
+            self._recordings[key] = recording_of(find_scenario(scenario), seed)
         return self._recordings[key]
 
     def method(self, name: str) -> MethodSpec:
@@ -61,7 +61,7 @@ class Runs:
         key = (scenario, method, seed)
         if key not in self._estimates:
             recording = self.recording(scenario, seed)
-            spec = self.method(method)
+            spec = on_recording(self.method(method), find_scenario(scenario))
             channels = tuple(recording.observations.dtype.names or ())
             lacking = missing(spec.declaration, recording.vehicle, channels)
             if lacking:
