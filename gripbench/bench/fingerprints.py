@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import gripbench
-from gripbench.bench.recorded_scenarios import RecordedScenario
+from gripbench.bench import recorded_scenarios
 from gripbench.envs import worlds
 from gripbench.envs.scenarios import Scenario
 from gripbench.envs.vehicles import load_vehicle
@@ -36,8 +36,9 @@ def versions() -> dict[str, str]:
 
 def scenario_digest(scenario: Scenario) -> str:
     """Return the digest of all that a recording depends on besides the seed."""
-    if isinstance(scenario, RecordedScenario):
-        return digest(scenario.content, scenario.absent, source_digest(_RECORDED))
+    if isinstance(scenario, recorded_scenarios.RecordedScenario):
+        windows = inspect.getsource(recorded_scenarios)
+        return digest(scenario.content, scenario.absent, windows, source_digest(_RECORDED))
     world = worlds.WORLDS[scenario.world]
     classes: tuple[Any, ...] = (world.scenario, world.simulation)
     files = [Path(inspect.getfile(item)) for item in classes]
