@@ -116,7 +116,7 @@ def plan_of(
         raise InputError("nothing to run: give a suite or a scenario")
     if not specs:
         raise InputError("nothing to run: give a suite or a method")
-    return Plan(
+    plan = Plan(
         scenarios=tuple(
             item if isinstance(item, Scenario) else find_scenario(item) for item in chosen
         ),
@@ -124,6 +124,13 @@ def plan_of(
         seeds=seeds_of(seeds),
         windows=None if all_windows else seeds_of(seeds),
     )
+    for scenario in plan.scenarios:
+        if not plan.seeds_of(scenario):
+            raise InputError(
+                f"seeds '{seeds}': {scenario.name} has no such window; give some of "
+                f"0:{getattr(scenario, 'runs', 0)}"
+            )
+    return plan
 
 
 def seeds_of(given: int | str | range | None) -> range:

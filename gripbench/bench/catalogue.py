@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from gripbench.bench.recorded_scenarios import PREFIX
 from gripbench.bench.registry import (
     all_scenario_files,
     built_in_methods,
@@ -35,7 +36,7 @@ def settings(name: str) -> dict[str, Any]:
     InputError
         If nothing has this name; the message names the nearest one.
     """
-    if name in all_scenario_files() or name.endswith(".toml"):
+    if name in all_scenario_files() or name.endswith(".toml") or name.startswith(PREFIX):
         scenario = find_scenario(name)
         sensors = {key: item.model_dump() for key, item in scenario.all_sensors().items()}
         return {"kind": "scenario", **scenario.model_dump(mode="json"), "sensors": sensors}

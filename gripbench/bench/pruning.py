@@ -6,6 +6,7 @@ import contextlib
 from collections.abc import Iterable
 from pathlib import Path
 
+from gripbench.bench.recorded_scenarios import PREFIX
 from gripbench.bench.registry import all_scenario_files, method_names
 from gripbench.bench.store import DamagedRowError, Store, leftovers, read_row
 from gripbench.errors import InputError
@@ -31,7 +32,9 @@ def stale(results: Path) -> list[Path]:
         except DamagedRowError:
             paths.append(path)
             continue
-        if row is not None and row.scenario not in known and row.method in method_names():
+        if row is None or row.scenario.startswith(PREFIX):
+            continue  # a recording may be stored anywhere
+        if row.scenario not in known and row.method in method_names():
             paths.append(path)
     return paths
 

@@ -132,6 +132,16 @@ def recorded_scenario(place: str) -> RecordedScenario:
     )
 
 
+def at_hand(name: str) -> bool:
+    """Tell whether a scenario is simulated, or a recording whose samples are here."""
+    if not name.startswith(PREFIX):
+        return True
+    try:
+        return not recorded_scenario(name).absent
+    except InputError:
+        return False
+
+
 def recording_of(scenario: Scenario, seed: int) -> Recording:
     """Return one run of a scenario: simulated, or a window of a log.
 

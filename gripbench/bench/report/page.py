@@ -16,6 +16,7 @@ import gripbench
 from gripbench.bench import tables
 from gripbench.bench.figures.style import SERIES
 from gripbench.bench.manifest import commit
+from gripbench.bench.recorded_scenarios import at_hand
 from gripbench.bench.report.content import (
     PaperResult,
     chosen_targets,
@@ -99,10 +100,15 @@ def write_report(
 def series_plans(
     rows: pd.DataFrame, targets: Sequence[str], shown: int, band: int
 ) -> list[SeriesPlan]:
-    """Return what to draw of each scenario: methods that ran there, on seeds that were run."""
+    """Return what to draw of each scenario: methods that ran there, on seeds that were run.
+
+    Recordings of real vehicles that are no longer at hand have no curves.
+    """
     plans = []
     good = rows[(rows["status"] == "ok") & rows["target"].isin(targets)]
     for scenario, part in good.groupby("scenario", sort=False):
+        if not at_hand(str(scenario)):
+            continue
         seeds = tuple(int(seed) for seed in sorted(part["seed"].unique()))
         estimates = {
             target: tuple(dict.fromkeys(part.loc[part["target"] == target, "label"]))
