@@ -182,8 +182,9 @@ def test_a_plot_refuses_what_is_not_there(runs, methods, name, message):
 
 
 def test_a_plot_of_a_method_without_its_sensors_says_so(runs):
-    with pytest.raises(InputError, match="cannot run on two_turns: the scenario has no sensor for"):
-        run_plot(runs, "two_turns", ["slip_slope"], "sideslip")
+    reason = "cannot run on two_turns_bicycle: the scenario has no sensor for"
+    with pytest.raises(InputError, match=reason):
+        run_plot(runs, "two_turns_bicycle", ["magnetometer_gps_cascade"], "sideslip")
 
 
 def test_a_part_behind_the_end_of_the_run_is_refused(runs):
