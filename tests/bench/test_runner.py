@@ -140,7 +140,7 @@ def test_a_scenario_that_cannot_be_simulated_leaves_rows(plan, tmp_path, monkeyp
     def fail(scenario, seed):
         raise ArithmeticError("no convergence")
 
-    monkeypatch.setattr("gripbench.bench.cells.record", fail)
+    monkeypatch.setattr("gripbench.bench.cells.recording_of", fail)
     report = run(plan, tmp_path)
     assert report.statuses == {"failed": 6}
     reason = read_rows(tmp_path)["reason"].iloc[0]
