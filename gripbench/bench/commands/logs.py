@@ -94,7 +94,7 @@ def recordings(
         Path | None, typer.Option(help="Draw a picture of each recording into this folder.")
     ] = None,
     format: Annotated[
-        str, typer.Option(help="terminal, plain, markdown, csv, latex or html.")
+        str, typer.Option(help="terminal, text, markdown, csv, latex or html.")
     ] = "terminal",
 ) -> None:
     """Score methods and trivial estimators on recordings of real vehicles."""
@@ -148,7 +148,8 @@ def identify(
         Path | None, typer.Option(help="Folder of the files instead of the one that is set.")
     ] = None,
 ) -> None:
-    """Identify tyres, or without a velocity reference the steering, from a recording."""
+    """Identify tyres, or without a velocity reference the steering, and sensor biases."""
+    from gripbench.envs.logs.biases import identify_biases
     from gripbench.envs.logs.channel_map import load_channel_map
     from gripbench.envs.logs.identification import (
         identified_vehicle,
@@ -157,6 +158,7 @@ def identify(
         write_vehicle,
     )
     from gripbench.envs.logs.published import load_recording, recording_files
+    from gripbench.envs.signals import signal
     from gripbench.envs.vehicles import load_vehicle
     from gripbench.errors import InputError
 
@@ -173,6 +175,15 @@ def identify(
         print(f"{name:20} {value:10.4g}  standard deviation {found.deviations[name]:.2g}")
     unseen = "" if found.test_rms is None else f", on the test windows {found.test_rms:.3g}"
     print(f"unexplained RMS on the training windows {found.train_rms:.3g}{unseen} {found.unit}")
+    if (spread := found.undetermined()) is not None:
+        print(spread)
+    for bias in identify_biases(runs):
+        name = f"{bias.channel} bias"
+        unseen = "" if bias.test_rms is None else f"; on test blocks {bias.test_rms:.2g}"
+        print(
+            f"{name:20} {bias.value:10.4g}  standard deviation {bias.deviation:.2g} "
+            f"{signal(bias.channel).unit}, from {bias.blocks} blocks in {bias.found_from}{unseen}"
+        )
     if out is not None:
         if not with_tyres:
             raise InputError(f"{recording}: without a velocity reference no tyres are identified")

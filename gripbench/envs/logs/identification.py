@@ -28,6 +28,10 @@ from gripbench.errors import InputError
 CORRELATION = 0.2
 """Time [s] over which residuals are taken for correlated."""
 
+LOOSE = 0.2
+"""Relative standard deviation above which a parameter counts as undetermined."""
+
+_MAY_BE_ZERO = ("steer_offset", "understeer_gradient")
 _SLOWEST = 0.8  # m/s; below, slip angles are noise
 _SMOOTHING = 0.1  # s, of the steering and yaw acceleration
 
@@ -58,6 +62,19 @@ class Identified:
     test_rms: float | None
     unit: str
     samples: int
+
+    def undetermined(self) -> str | None:
+        """Return a sentence on what the log cannot tell, None where it tells everything.
+
+        A parameter that cannot be zero, such as a stiffness or a ratio, counts as undetermined
+        where its standard deviation is above a fifth of it.
+        """
+        loose = [
+            f"{name} ({value:.3g} with a standard deviation of {self.deviations[name]:.2g})"
+            for name, value in self.values.items()
+            if name not in _MAY_BE_ZERO and self.deviations[name] > LOOSE * abs(value)
+        ]
+        return f"undetermined by this log: {', '.join(loose)}" if loose else None
 
 
 def identify_tyres(recordings: Sequence[Recording], steering: bool = True) -> Identified:
