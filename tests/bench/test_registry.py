@@ -1,6 +1,6 @@
 """Methods, scenarios and suites by name, file, decorator and entry point."""
 
-import importlib.metadata
+from pathlib import Path
 
 import pytest
 
@@ -76,24 +76,43 @@ def test_the_name_of_a_built_in_method_cannot_be_taken():
         gripbench.register(type("Mine", (), {"name": "slip_slope"}))
 
 
-def test_an_entry_point_is_a_method(monkeypatch, plugins, tmp_path, short_scenario):
-    point = importlib.metadata.EntryPoint("sound", "faulty:Sound", "gripbench.methods")
-    monkeypatch.setattr(
-        registry, "entry_points", lambda group: {"sound": point} if "methods" in group else {}
-    )
-    monkeypatch.syspath_prepend(str(plugins))
-    assert method_names()["sound"] == "entry point faulty:Sound"
+@pytest.fixture
+def installed(monkeypatch, tmp_path):
+    """A function that puts a package with these files and entry points on the path."""
+
+    def install(files, entry_points):
+        site = tmp_path / "site-packages"
+        for name, text in files.items():
+            (site / name).parent.mkdir(parents=True, exist_ok=True)
+            (site / name).write_text(text, encoding="utf-8")
+        information = site / "a_plugin-1.0.dist-info"
+        information.mkdir()
+        (information / "METADATA").write_text(
+            "Metadata-Version: 2.1\nName: a-plugin\nVersion: 1.0\n"
+        )
+        (information / "entry_points.txt").write_text(entry_points, encoding="utf-8")
+        monkeypatch.syspath_prepend(str(site))
+
+    return install
+
+
+def test_an_installed_package_brings_a_method(installed, plugins, tmp_path, short_scenario):
+    source = (plugins / "faulty.py").read_text(encoding="utf-8")
+    installed({"a_plugin.py": source}, "[gripbench.methods]\nsound = a_plugin:Sound\n")
+    assert method_names()["sound"] == "entry point a_plugin:Sound"
     rows = gripbench.run(scenarios=[short_scenario], methods=["sound"], results=tmp_path, workers=1)
     assert list(rows["status"]) == ["ok"]
 
 
-def test_an_entry_point_gives_scenarios(monkeypatch, short_scenario):
-    class Point:
-        def load(self):
-            return short_scenario
-
-    monkeypatch.setattr(
-        registry, "entry_points", lambda group: {"short": Point()} if "scenar" in group else {}
+def test_an_installed_package_brings_scenarios(installed, short_scenario):
+    text = Path(short_scenario).read_text(encoding="utf-8")
+    code = "from pathlib import Path\n\nFOLDER = Path(__file__).parent / 'scenarios'\n"
+    installed(
+        {
+            "a_plugin_of_scenarios/__init__.py": code,
+            "a_plugin_of_scenarios/scenarios/short.toml": text,
+        },
+        "[gripbench.scenarios]\nmine = a_plugin_of_scenarios:FOLDER\n",
     )
     assert find_scenario("short").horizon == 1.0
 
