@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -65,7 +66,8 @@ def parse(model: type[Model], content: Mapping[str, Any], source: str | Path) ->
         On the first mistake, with file, key, what was given and what is allowed.
     """
     try:
-        return model.model_validate(dict(content))
+        # as JSON a list may become a tuple, while strictly no text or truth value becomes a number
+        return model.model_validate_json(json.dumps(content, default=str), strict=True)
     except ValidationError as error:
         details = error.errors()
         # a misspelt key is also a missing one; the misspelling is what helps
@@ -75,15 +77,17 @@ def parse(model: type[Model], content: Mapping[str, Any], source: str | Path) ->
 
 def _describe(model: type[BaseModel], detail: ErrorDetails) -> str:
     location = [str(part) for part in detail["loc"]]
-    key = ".".join(location) or "(file)"
+    key = ".".join(location)
     message = detail["msg"].removeprefix("Value error, ")
     message = message[:1].lower() + message[1:]
+    if not location:
+        return message  # a check over several keys names them itself
     if detail["type"] == "extra_forbidden":
         hint = nearest(location[-1], _keys_beside(model, location))
         return f"unknown key '{key}': {hint}"
     if detail["type"] == "missing":
         return f"missing key '{key}'"
-    shown = "" if isinstance(detail["input"], Mapping) else f" (given {detail['input']!r})"
+    shown = "" if isinstance(detail["input"], Mapping | list) else f" (given {detail['input']!r})"
     return f"key '{key}': {message}{shown}"
 
 

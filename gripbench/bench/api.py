@@ -17,6 +17,9 @@ from gripbench.bench.store import DEFAULT_RESULTS, Store
 from gripbench.envs.scenarios import Scenario
 from gripbench.errors import InputError
 
+MOST_SEEDS = 1_000_000
+"""Largest number of seeds of one run: a row each would fill a disk long before."""
+
 
 def run(
     suite: str = "",
@@ -149,6 +152,8 @@ def seeds_of(given: int | str | range | None) -> range:
             found = range(int(first), int(last)) if colon else range(int(first))
         except ValueError:
             raise InputError(f"seeds '{given}': give a number N, or A:B for A to B-1") from None
-    if not len(found) or min(found) < 0:
+    if found.start >= found.stop or found.start < 0:
         raise InputError(f"seeds '{given}': give at least one seed, none negative")
+    if found.stop - found.start > MOST_SEEDS:
+        raise InputError(f"seeds '{given}': give at most {MOST_SEEDS} seeds")
     return found

@@ -16,11 +16,11 @@ from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from gripbench.bench.declarations import declaration_of
 from gripbench.envs.recordings import Recording
@@ -78,6 +78,10 @@ class RecordedScenario(Scenario):
     settings: dict[str, dict[str, float]] = {}
     absent: str = ""
     content: str = ""
+
+    @model_validator(mode="after")
+    def _check_samples(self) -> Self:
+        return self  # a log's samples come when they come
 
     def all_sensors(self) -> dict[str, Sensor]:
         """Return no sensor model: the log has the samples."""

@@ -23,6 +23,7 @@ from gripbench.envs.sensors import SensorSuite
 from gripbench.envs.signals import NEW, signal
 from gripbench.envs.simulation import Action
 from gripbench.envs.worlds import load_scenario, simulation_of
+from gripbench.errors import InputError
 
 Observation = dict[str, npt.NDArray[np.float64]]
 
@@ -77,7 +78,12 @@ class ActionMap:
 
     def inputs(self, action: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Return the plant's inputs within their range, shape (..., inputs)."""
-        return np.clip(np.asarray(action, np.float64) * self.scale, self.low, self.high)
+        given = np.asarray(action, np.float64)
+        if given.shape[-1:] != self.scale.shape:
+            raise InputError(f"the action's shape is {given.shape}; its last is {self.scale.size}")
+        if not np.isfinite(given).all():
+            raise InputError(f"the action {action} is not finite")
+        return np.clip(given * self.scale, self.low, self.high)
 
     def action(self, inputs: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Return the action that gives the inputs, shape (..., inputs)."""

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from gripbench.configuration import Configuration
 from gripbench.envs import longitudinal_integrators as integrators
@@ -24,6 +24,7 @@ from gripbench.envs.longitudinal_plant import (
 from gripbench.envs.profiles import (
     Segment,
     breakpoints,
+    check_range,
     profile_value,
     profile_values,
     segment_records,
@@ -47,6 +48,12 @@ class TorqueDriver(Configuration):
 
     front: tuple[Segment, ...]
     rear: tuple[Segment, ...] | None = None
+
+    @field_validator("front", "rear")
+    @classmethod
+    def _check_range(cls, torque: tuple[Segment, ...] | None) -> tuple[Segment, ...] | None:
+        check_range(torque or (), -_FULL_TORQUE, _FULL_TORQUE)
+        return torque
 
 
 class LongitudinalScenario(Scenario):
@@ -75,12 +82,14 @@ class LongitudinalScenario(Scenario):
     wheel_speed_noise: float = Field(default=0.0, ge=0.0, le=0.1)
     driver: TorqueDriver
 
+    @field_validator("friction")
+    @classmethod
+    def _check_range(cls, friction: tuple[Segment, ...]) -> tuple[Segment, ...]:
+        check_range(friction, 0.01, 2.0)
+        return friction
+
     @model_validator(mode="after")
     def _check_friction(self) -> Self:
-        for piece in self.friction:
-            for value in (piece.first, piece.last):
-                if not 0.01 <= value <= 2.0:
-                    raise ValueError(f"friction is {value:g}; allowed is 0.01 to 2")
         covered = 0.0
         for piece in sorted(self.friction, key=lambda s: s.start):
             if piece.start != covered:

@@ -18,7 +18,7 @@ SEGMENT_TYPE = np.dtype(
 
 
 class Segment(Configuration):
-    """One piece: a line from `first` to `last`, plus `amplitude * sin(2 pi t / period)`.
+    """One piece: a line from `first` to `last`, plus `amplitude * sin(2 pi (t - start) / period)`.
 
     Times are in seconds; the values have the unit of what the profile drives.
     """
@@ -35,6 +35,20 @@ class Segment(Configuration):
         if self.end <= self.start:
             raise ValueError(f"end {self.end:g} s is not after start {self.start:g} s")
         return self
+
+
+def check_range(segments: tuple[Segment, ...], low: float, high: float) -> None:
+    """Raise a ValueError if a piece may leave the range, its sine at full amplitude."""
+    for piece in segments:
+        for value in (
+            min(piece.first, piece.last) - abs(piece.amplitude),
+            max(piece.first, piece.last) + abs(piece.amplitude),
+        ):
+            if not low <= value <= high:
+                raise ValueError(
+                    f"the piece from {piece.start:g} s reaches {value:g}; "
+                    f"allowed is {low:g} to {high:g}"
+                )
 
 
 def segment_records(segments: tuple[Segment, ...]) -> npt.NDArray[np.void]:

@@ -11,6 +11,8 @@ from gripbench.envs.sensors import Sensor, load_sensor_suite
 from gripbench.envs.signals import signal
 from gripbench.errors import GripbenchError
 
+_MOST_SAMPLES = 5e7  # of one run; a longitudinal one takes 144 bytes a sample
+
 
 class Scenario(Configuration):
     """What the scenarios of every world have in common.
@@ -48,7 +50,7 @@ class Scenario(Configuration):
     world: str
     vehicle: str
     horizon: float = Field(gt=0.0, le=36000.0)
-    sample_time: float = Field(default=0.001, gt=0.0, le=0.1)
+    sample_time: float = Field(default=0.001, ge=1e-5, le=0.1)
     integrator: str
     sensor_suite: str
     sensors: dict[str, Sensor] = {}
@@ -70,6 +72,21 @@ class Scenario(Configuration):
             raise ValueError(f"horizon {self.horizon:g} s is shorter than one sample")
         if self.score_from >= self.horizon:
             raise ValueError(f"score_from {self.score_from:g} s is not before the horizon")
+        return self
+
+    @model_validator(mode="after")
+    def _check_samples(self) -> Self:
+        samples = self.horizon / self.sample_time
+        if samples > _MOST_SAMPLES:
+            raise ValueError(
+                f"horizon {self.horizon:g} s holds {samples:.3g} samples of {self.sample_time:g} s;"
+                f" allowed are {_MOST_SAMPLES:.0f}"
+            )
+        if abs(samples - self.steps) > 1e-6:
+            raise ValueError(
+                f"horizon {self.horizon!r} s is not a whole number of samples of "
+                f"{self.sample_time!r} s"
+            )
         return self
 
     @property

@@ -105,7 +105,7 @@ _LONGITUDINAL = (
     ),
     Signal(
         "speed_x_rate", "m/s^2", "vehicle", "forward", IDEALISED,
-        "Rate of change of v_x without gravity's component",
+        "Exact rate of change of v_x, gravity's component included",
     ),
     Signal(
         "wheel_acceleration_front", "rad/s^2", "wheel", "spinning up", IDEALISED,

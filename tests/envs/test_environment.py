@@ -7,6 +7,7 @@ from gymnasium.utils.env_checker import check_env
 
 from gripbench.envs.environment import VehicleEnvironment
 from gripbench.envs.worlds import load_scenario, record, scenario_files, simulation_of
+from gripbench.errors import InputError
 
 STEPPED = [name for name in scenario_files() if load_scenario(name).environment]
 ONE_OF_EACH_WORLD = ["noisy_acceleration", "double_lane_change_snow"]
@@ -112,6 +113,15 @@ def test_lanes_give_the_bytes_of_single_environments(name):
         assert info["truth"]["speed_x"][1] == results[1][4]["truth"]["speed_x"]
     assert together["time"].shape == (3,)
     lanes.close()
+
+
+@pytest.mark.parametrize("name", ONE_OF_EACH_WORLD)
+@pytest.mark.parametrize(("value", "more"), [(np.nan, 0), (np.inf, 0), (0.0, 1)])
+def test_an_action_that_is_none_is_refused(name, value, more):
+    environment = VehicleEnvironment(name)
+    environment.reset(seed=0)
+    with pytest.raises(InputError, match="the action"):
+        environment.step(np.full(environment.action_space.shape[0] + more, value))
 
 
 def test_lane_starts_again_after_its_end():
