@@ -44,15 +44,8 @@ def filter_type(states: int, outputs: int = 0) -> np.dtype[Any]:
     """
     n, m = states, outputs
     real = np.float64
-    fields: list[tuple[str, Any, tuple[int, ...]]] = [
-        ("x", real, (n,)),
-        ("P", real, (n, n)),
-        ("F", real, (n, n)),
-        ("Q", real, (n, n)),
-        ("h", real, (n,)),
-        ("work", real, (max(3, n), n)),
-    ]
-    if m:
+    fields: list[tuple[str, Any, tuple[int, ...]]] = []
+    if m:  # first: numba takes a record for a subtype of one that it begins with
         fields += [
             ("H", real, (m, n)),
             ("R", real, (m, m)),
@@ -63,6 +56,14 @@ def filter_type(states: int, outputs: int = 0) -> np.dtype[Any]:
             ("cross", real, (n, m)),
             ("K", real, (n, m)),
         ]
+    fields += [
+        ("x", real, (n,)),
+        ("P", real, (n, n)),
+        ("F", real, (n, n)),
+        ("Q", real, (n, n)),
+        ("h", real, (n,)),
+        ("work", real, (max(3, n), n)),
+    ]
     return np.dtype(fields)
 
 

@@ -109,3 +109,8 @@ def test_measurements_with_a_singular_innovation_are_infinitely_far():
     records = np.zeros(1, kalman.filter_type(2, 1))
     distance = kalman.innovation_distance(records[0])
     assert distance == np.inf
+
+
+def test_a_filter_with_outputs_is_no_subtype_of_one_without():
+    plain, joint = kalman.filter_type(2), kalman.filter_type(2, 2)
+    assert joint.names[: len(plain.names)] != plain.names
