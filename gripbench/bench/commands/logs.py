@@ -141,6 +141,10 @@ def identify(
     steering: Annotated[
         bool, typer.Option(help="Fit the steering's scale and offset with the tyres.")
     ] = True,
+    friction: Annotated[
+        float | None,
+        typer.Option(min=0.05, max=2.0, help="Friction to take as known instead of fitting it."),
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(help="Write the vehicle with the tyres found to this file.")
     ] = None,
@@ -166,7 +170,7 @@ def identify(
     runs = imported.recordings
     with_tyres = "speed_y" in (runs[0].truth.dtype.names or ())
     if with_tyres:
-        found = identify_tyres(runs, steering)
+        found = identify_tyres(runs, steering, friction)
     else:
         column = load_channel_map(recording_files()[recording]).channels["steer_angle"]
         divisor = runs[0].vehicle[column.per] if column.per else 1.0

@@ -54,6 +54,9 @@ class Identified:
         Unit of these.
     samples
         Samples of the training windows.
+    reached
+        Largest mean of |a_y|/g over half a second of them: no less is the friction; None where it
+        was not looked at.
     """
 
     values: dict[str, float]
@@ -62,6 +65,7 @@ class Identified:
     test_rms: float | None
     unit: str
     samples: int
+    reached: float | None = None
 
     def undetermined(self) -> str | None:
         """Return a sentence on what the log cannot tell, None where it tells everything.
@@ -74,10 +78,18 @@ class Identified:
             for name, value in self.values.items()
             if name not in _MAY_BE_ZERO and self.deviations[name] > LOOSE * abs(value)
         ]
+        mu = self.values.get("mu")
+        if mu is not None and self.reached is not None and mu < self.reached:
+            loose.append(
+                f"mu ({mu:.3g} is below the |a_y|/g of {self.reached:.3g} that the training "
+                "windows hold for half a second, so only that bound is known: fix the friction)"
+            )
         return f"undetermined by this log: {', '.join(loose)}" if loose else None
 
 
-def identify_tyres(recordings: Sequence[Recording], steering: bool = True) -> Identified:
+def identify_tyres(
+    recordings: Sequence[Recording], steering: bool = True, friction: float | None = None
+) -> Identified:
     """Fit brush tyres, friction, yaw inertia and steering to a log with a velocity reference.
 
     Parameters
@@ -87,6 +99,9 @@ def identify_tyres(recordings: Sequence[Recording], steering: bool = True) -> Id
         observations have `steer_angle`; the window `train` is fitted, `test` only judged.
     steering
         Whether scale and offset of the steering are fitted too.
+    friction
+        Friction that is taken as known, for a log in which the tyres never reach their limit;
+        None: it is fitted.
 
     Raises
     ------
@@ -100,10 +115,11 @@ def identify_tyres(recordings: Sequence[Recording], steering: bool = True) -> Id
     test = _axles(recordings, "test", needed)
     names = ("stiffness_front", "stiffness_rear", "mu", "gyration_squared", "steer_scale",
              "steer_offset")  # fmt: skip
-    first = np.array([30.0, 30.0, 0.5, train.front * train.rear, 1.0, 0.0])
+    grip = 0.5 if friction is None else friction
+    first = np.array([30.0, 30.0, grip, train.front * train.rear, 1.0, 0.0])
     # A steering angle that never changes cannot tell its scale from the front stiffness.
     varied = steering and float(np.std(train.steer)) > np.deg2rad(1.0)
-    free = np.array([True, True, True, True, varied, varied])
+    free = np.array([True, True, friction is None, True, varied, varied])
     low = np.array([1.0, 1.0, 0.05, 0.05 * first[3], 0.5, -0.2])
     high = np.array([500.0, 500.0, 1.5, 5.0 * first[3], 2.0, 0.2])
 
@@ -136,6 +152,7 @@ def identify_tyres(recordings: Sequence[Recording], steering: bool = True) -> Id
         else float(np.sqrt(np.mean(_axle_residuals(found, test) ** 2))),
         unit="m/s^2",
         samples=train.forward.size,
+        reached=_held_for(np.abs(train.lateral) / GRAVITY, train.correlated),
     )
 
 
@@ -271,6 +288,12 @@ def _axles(recordings: Sequence[Recording], window: str, needed: tuple[str, ...]
         forward, left, turn, turn_rate, lateral, steer, vehicle["cg_to_front"],
         vehicle["cg_to_rear"], max(1.0, CORRELATION / float(np.median(spacing))),
     )  # fmt: skip
+
+
+def _held_for(used: Floats, correlated: float) -> float:
+    """Return the largest mean over half a second."""
+    wide = max(1, round(correlated * 0.5 / CORRELATION))
+    return float(np.convolve(used, np.ones(wide) / wide, mode="valid").max())
 
 
 def _axle_residuals(parameters: Floats, axles: _Axles) -> Floats:

@@ -1,9 +1,12 @@
 """Identification finds the parameters of a model that is known."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 from gripbench.envs.logs.identification import (
+    Identified,
     identified_vehicle,
     identify_steering,
     identify_tyres,
@@ -124,3 +127,22 @@ def test_missing_window_is_named(weave):
     blind = Recording("weave", 0, weave.vehicle, weave.observations, weave.truth[["time"]])
     with pytest.raises(InputError, match="weave: the reference has no 'speed_x'"):
         identify_tyres([blind])
+
+
+def test_friction_below_what_the_window_holds_is_said_to_be_undetermined(weave):
+    found = identify_tyres([weave], friction=0.9)
+    assert "mu" not in found.values
+    assert found.undetermined() is None or "mu" not in found.undetermined()
+    wrong = dataclasses.replace(found, values=found.values | {"mu": 0.9 * found.reached})
+    wrong = dataclasses.replace(wrong, deviations=found.deviations | {"mu": 0.01})
+    assert "only that bound is known" in wrong.undetermined()
+    assert found.reached == pytest.approx(
+        np.max(np.abs(weave.truth["accel_y"])[:4000]) / 9.81, rel=0.1
+    )
+
+
+def test_a_ratio_that_a_straight_drive_cannot_tell_is_named():
+    found = Identified({"steering_ratio": 57.0}, {"steering_ratio": 19.0}, 0.0, None, "rad", 100)
+    assert "steering_ratio (57 with a standard deviation of 19)" in found.undetermined()
+    sure = dataclasses.replace(found, deviations={"steering_ratio": 2.0})
+    assert sure.undetermined() is None
