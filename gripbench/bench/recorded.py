@@ -18,8 +18,10 @@ import numpy.typing as npt
 
 from gripbench.bench.execution import SkippedError, execute, missing
 from gripbench.bench.registry import MethodSpec, built_in_methods, choose_method
+from gripbench.bench.rows import UTILISATION_BANDS
 from gripbench.bench.scoring import DivergedError, score, targets_of
 from gripbench.bench.yardsticks import YARDSTICKS
+from gripbench.envs.logs.excitation import utilisation_bound
 from gripbench.envs.logs.importing import ImportedLog
 from gripbench.envs.logs.published import AbsentDataError, load_recording
 from gripbench.envs.logs.storing import load
@@ -33,6 +35,9 @@ TARGETS = ("sideslip", "yaw", "mu_used", "mu")
 
 BLOCK = 2.0
 """Length [s] of the blocks of time that the bootstrap draws."""
+
+FEWEST = 3
+"""Blocks from which the bootstrap draws at least."""
 
 RESAMPLES = 2000
 """Draws of the bootstrap."""
@@ -62,6 +67,9 @@ class RecordedScore:
         Mean distance from the known interval, for `mean`.
     samples
         Samples that count.
+    excitation
+        Band of utilisation, of `gripbench.bench.rows.UTILISATION_BANDS`, that these samples have;
+        empty: all.
     """
 
     recording: str
@@ -77,6 +85,7 @@ class RecordedScore:
     high: float | None = None
     outside: float | None = None
     samples: int = 0
+    excitation: str = ""
 
 
 def published_methods(imported: ImportedLog, methods: Sequence[str] = ()) -> list[MethodSpec]:
@@ -97,7 +106,10 @@ def published_methods(imported: ImportedLog, methods: Sequence[str] = ()) -> lis
 
 
 def score_published(
-    names: Iterable[str], methods: Sequence[str] = (), folder: Path | None = None
+    names: Iterable[str],
+    methods: Sequence[str] = (),
+    folder: Path | None = None,
+    by_excitation: bool = False,
 ) -> list[RecordedScore]:
     """Score methods and yardsticks on published or imported recordings.
 
@@ -111,6 +123,8 @@ def score_published(
         recording's map has settings for get them.
     folder
         Where the files lie, see `gripbench.envs.logs.locations`.
+    by_excitation
+        See `score_recordings`.
     """
     scores: list[RecordedScore] = []
     for name in names:
@@ -120,12 +134,12 @@ def score_published(
             scores.append(RecordedScore(name, "", "", "", "skipped", str(error)))
             continue
         chosen = published_methods(imported, methods)
-        scores += score_recordings(imported.recordings, chosen)
+        scores += score_recordings(imported.recordings, chosen, by_excitation)
     return scores
 
 
 def score_recordings(
-    recordings: Sequence[Recording], methods: Sequence[MethodSpec]
+    recordings: Sequence[Recording], methods: Sequence[MethodSpec], by_excitation: bool = False
 ) -> list[RecordedScore]:
     """Score methods and yardsticks on the runs of one recording.
 
@@ -135,24 +149,33 @@ def score_recordings(
         Its runs.
     methods
         The methods; one that lacks a sensor or a parameter gives a row with the reason.
+    by_excitation
+        Whether each figure comes once for each band of the utilisation, see
+        `gripbench.envs.logs.excitation`, instead of once for all samples.
     """
+    bands = tuple(name for name, _, _ in UTILISATION_BANDS) if by_excitation else ("",)
     found: list[RecordedScore] = []
     for target, yardsticks in YARDSTICKS.items():
         for name, estimate in yardsticks.items():
             series = [estimate(recording) for recording in recordings]
             if any(one is None for one in series):
                 continue
-            row = _scored(
-                recordings, target, name, "yardstick", [s for s in series if s is not None]
-            )
-            found += [] if row is None else [row]
+            given = [s for s in series if s is not None]
+            rows = [_scored(recordings, target, name, "yardstick", given, band) for band in bands]
+            found += [row for row in rows if row is not None]
     for spec in methods:
-        found += _of_method(recordings, spec)
+        found += _of_method(recordings, spec, bands)
     order = {target: index for index, target in enumerate(TARGETS)}
-    return sorted(found, key=lambda row: order.get(row.target, len(order)))
+    places = {band: index for index, band in enumerate(bands)}
+    return sorted(
+        found,
+        key=lambda row: (order.get(row.target, len(order)), places.get(row.excitation, 0)),
+    )
 
 
-def _of_method(recordings: Sequence[Recording], spec: MethodSpec) -> list[RecordedScore]:
+def _of_method(
+    recordings: Sequence[Recording], spec: MethodSpec, bands: Sequence[str]
+) -> list[RecordedScore]:
     declaration = spec.declaration
     name = recordings[0].scenario
     estimated = [target for target in TARGETS if target in declaration.estimates]
@@ -184,7 +207,9 @@ def _of_method(recordings: Sequence[Recording], spec: MethodSpec) -> list[Record
         reason = reason or "estimates nothing that the recording has a reference for"
         return [RecordedScore(name, "", _label(spec), "method", status, reason)]
     rows = [
-        _scored(recordings, target, _label(spec), "method", series[target]) for target in estimated
+        _scored(recordings, target, _label(spec), "method", series[target], band)
+        for target in estimated
+        for band in bands
     ]
     kept = [row for row in rows if row is not None]
     reason = "the recording has no reference for any of its estimates"
@@ -203,6 +228,7 @@ def _scored(
     name: str,
     kind: str,
     series: Sequence[Floats],
+    band: str = "",
 ) -> RecordedScore | None:
     """Return the score over all runs, or None where nothing is known of the target."""
     bounded = [
@@ -213,6 +239,8 @@ def _scored(
     for recording, estimate in zip(recordings, series, strict=True):
         time = recording.truth["time"]
         inside = scored_samples(recording)
+        if band:
+            inside &= _in_band(recording, band)
         if bounded:
             for bound in (b for b in recording.bounds if b.signal == target):
                 within = inside & (time >= bound.start) & (time <= bound.end)
@@ -234,15 +262,24 @@ def _scored(
     seed = zlib.crc32(f"{recordings[0].scenario} {target}".encode())
     value, low, high = _block_mean(parts, seed)
     if not bounded:
-        value, low, high = (float(np.sqrt(max(x, 0.0))) for x in (value, low, high))
+        value, low, high = (float(np.sqrt(x)) for x in (value, low, high))
     return RecordedScore(
         recordings[0].scenario, target, name, kind, "ok",
         measure="mean" if bounded else "RMS error",
         unit="deg" if target in _ANGLES else "-",
         value=value, low=low, high=high,
         outside=float(np.concatenate(outside).mean()) if bounded else None,
-        samples=samples,
+        samples=samples, excitation=band,
     )  # fmt: skip
+
+
+def _in_band(recording: Recording, band: str) -> npt.NDArray[np.bool_]:
+    """Return where the utilisation lies in a band; nowhere without an accelerometer."""
+    used = utilisation_bound(recording)
+    if used is None:
+        return np.zeros(len(recording.truth), dtype=bool)
+    low, high = next((low, high) for name, low, high in UTILISATION_BANDS if name == band)
+    return (used >= low) & (used < high)
 
 
 def scored_samples(recording: Recording) -> npt.NDArray[np.bool_]:
@@ -258,7 +295,10 @@ def scored_samples(recording: Recording) -> npt.NDArray[np.bool_]:
 
 
 def _block_mean(parts: Sequence[tuple[Floats, Floats]], seed: int) -> tuple[float, float, float]:
-    """Return the mean over all samples and its 95 % interval over blocks of time."""
+    """Return the mean over all samples and its 95 % interval over blocks of time.
+
+    The interval is NaN where there are fewer than `FEWEST` blocks to draw from.
+    """
     sums, counts = [], []
     for time, values in parts:
         if not len(time):
@@ -268,6 +308,8 @@ def _block_mean(parts: Sequence[tuple[Floats, Floats]], seed: int) -> tuple[floa
         counts.append(np.bincount(block).astype(np.float64))
     total, count = np.concatenate(sums), np.concatenate(counts)
     total, count = total[count > 0.0], count[count > 0.0]
+    if len(total) < FEWEST:
+        return float(total.sum() / count.sum()), np.nan, np.nan
     drawn = np.random.default_rng(seed).integers(0, len(total), (RESAMPLES, len(total)))
     means = total[drawn].sum(axis=1) / count[drawn].sum(axis=1)
     low, high = np.percentile(means, (2.5, 97.5))

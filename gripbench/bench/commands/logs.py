@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -90,6 +91,12 @@ def recordings(
     data: Annotated[
         Path | None, typer.Option(help="Folder of the files instead of the one that is set.")
     ] = None,
+    by_excitation: Annotated[
+        bool,
+        typer.Option(
+            "--by-excitation", help="One figure for each band of the utilisation of the tyres."
+        ),
+    ] = False,
     figures: Annotated[
         Path | None, typer.Option(help="Draw a picture of each recording into this folder.")
     ] = None,
@@ -103,7 +110,7 @@ def recordings(
     from gripbench.bench.tables import show
     from gripbench.envs.logs.published import recording_files
 
-    scores = score_published(names or recording_files(), method or (), data)
+    scores = score_published(names or recording_files(), method or (), data, by_excitation)
     scored = [score for score in scores if score.status == "ok"]
     if scored:
         show(_table(scored), format)
@@ -205,12 +212,14 @@ def _table(scores: list[RecordedScore]) -> Table:
             "target": score.target,
             "estimator": score.estimator,
             "kind": score.kind,
+            "excitation": score.excitation,
             "measure": f"{score.measure} [{score.unit}]",
             "value": score.value,
-            "interval": f"{score.low:.3g} to {score.high:.3g}",
+            "interval": "–" if isnan(low) else f"{low:.3g} to {high:.3g}",
             "outside": score.outside,
         }
         for score in scores
+        for low, high in [(score.low or 0.0, score.high or 0.0)]
     ]
     return Table(
         (
@@ -218,6 +227,7 @@ def _table(scores: list[RecordedScore]) -> Table:
             Column("target", "Target"),
             Column("estimator", "Estimator"),
             Column("kind", "Kind"),
+            *([Column("excitation", "Excitation")] if any(s.excitation for s in scores) else []),
             Column("measure", "Figure"),
             Column("value", "Value", format=".3g"),
             Column("interval", "95 % interval"),
