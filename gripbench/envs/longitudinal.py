@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -53,6 +54,9 @@ class TorqueDriver(Configuration):
     @classmethod
     def _check_range(cls, torque: tuple[Segment, ...] | None) -> tuple[Segment, ...] | None:
         check_range(torque or (), -_FULL_TORQUE, _FULL_TORQUE)
+        for before, after in pairwise(sorted(torque or (), key=lambda s: s.start)):
+            if after.start < before.end:
+                raise ValueError(f"pieces overlap at {after.start:g} s")
         return torque
 
 
