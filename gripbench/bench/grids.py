@@ -149,6 +149,8 @@ def on_board(
         part = lines[lines["scenario"].isin(scenarios)]
         # what is at home in another part is a stranger here
         elsewhere = {label for label, home in homes.items() if not home & scenarios}
+        if scenarios <= real:  # what lacks the sensors of the one drive has no place on its board
+            elsewhere |= set(part["label"]) - set(homes.index)
         parts.append(_where_all_run(part[~part["label"].isin(elsewhere)], set(homes.index)))
     return parts
 

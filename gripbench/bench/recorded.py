@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -96,13 +96,16 @@ def published_methods(imported: ImportedLog, methods: Sequence[str] = ()) -> lis
     imported
         The recording.
     methods
-        Choices of methods, `name[:variant]`; by default every built-in.
+        Choices of methods, `name[:variant][@parameter=value,...]`, whose own settings come first;
+        by default every built-in.
     """
     settings = imported.provenance.channel_map.get("settings", {})
-    return [
-        choose_method(method, parameters=settings.get(method.partition(":")[0], {}))
-        for method in methods or list(built_in_methods())
-    ]
+    found = []
+    for method in methods or list(built_in_methods()):
+        plain = choose_method(method)
+        local = settings.get(plain.declaration.name, {}) | plain.parameters
+        found.append(replace(choose_method(method, parameters=local), shown=plain.label))
+    return found
 
 
 def score_published(
@@ -218,6 +221,8 @@ def _of_method(
 
 def _label(spec: MethodSpec) -> str:
     """Return the method's name and variant; its settings are the recording's."""
+    if spec.shown:
+        return spec.shown
     name = spec.declaration.name
     return f"{name}:{spec.variant}" if spec.variant else name
 
