@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from gripbench.configuration import CONFIGS, parse, read_toml
 from gripbench.envs.bicycle import BicycleScenario, BicycleSimulation
-from gripbench.envs.longitudinal import LongitudinalScenario, LongitudinalSimulation
+from gripbench.envs.longitudinal import PAPER_SOLVER, LongitudinalScenario, LongitudinalSimulation
 from gripbench.envs.planar import PlanarScenario, PlanarSimulation
 from gripbench.envs.recordings import Recording
 from gripbench.envs.scenarios import Scenario
@@ -24,12 +27,15 @@ class World:
 
     scenario: type[Scenario]
     simulation: Callable[..., Simulation]
+    truth_type: np.dtype[Any]
 
 
 WORLDS: dict[str, World] = {
-    "longitudinal": World(LongitudinalScenario, LongitudinalSimulation),
-    "planar": World(PlanarScenario, PlanarSimulation),
-    "bicycle": World(BicycleScenario, BicycleSimulation),
+    "longitudinal": World(
+        LongitudinalScenario, LongitudinalSimulation, LongitudinalSimulation.truth_type
+    ),
+    "planar": World(PlanarScenario, PlanarSimulation, PlanarSimulation.truth_type),
+    "bicycle": World(BicycleScenario, BicycleSimulation, BicycleSimulation.truth_type),
 }
 """Every world, by the name that scenario files use."""
 
@@ -58,7 +64,14 @@ def load_scenario(name: str) -> Scenario:
     world = content.get("world")
     if world not in WORLDS:
         raise InputError(f"{path}: key 'world' is {world!r}: {nearest(str(world), WORLDS)}")
-    return parse(WORLDS[world].scenario, content, path)
+    scenario = parse(WORLDS[world].scenario, content, path)
+    if name.endswith(".toml"):
+        sample_time = None if scenario.integrator == PAPER_SOLVER else scenario.sample_time
+        try:
+            SensorSuite(scenario.all_sensors(), WORLDS[world].truth_type, sample_time, 0)
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from None
+    return scenario
 
 
 def simulation_of(scenario: Scenario, vehicle: Vehicle | None = None) -> Simulation:

@@ -111,6 +111,7 @@ def _file(tmp_path, old, new):
         ("first = 0.9", "first = nan", r"key 'friction\.0\.first'.*finite"),
         ("first = 0.9", "first = 5.0", "key 'friction'.*reaches 5; allowed is 0.01 to 2"),
         ("start = 1.0, end = 20.0", "start = 0.5, end = 20.0", "pieces overlap at 0.5 s"),
+        ("[driver]", "[sensors.speed_gps]\nrate = 5.0\n[driver]", "mine.toml: sensors.speed_gps"),
         ("last = 0.9", "last = 0.9, amplitude = 5.0", "reaches -4.1; allowed is 0.01 to 2"),
         ("last = 150.0", "last = 1e300", "key 'driver.front'.*allowed is -5000 to 5000"),
         ("horizon = 30.0", "horizon = 29.9995", "29.9995 s is not a whole number of samples"),
