@@ -162,3 +162,27 @@ def test_heading_of_the_road_drive_beats_the_course():
 def test_sideslip_of_the_small_car_beats_zero():
     rows = _published("f1tenth_optitrack", "dugoff_ekf")
     assert _row(rows, "sideslip", "dugoff_ekf").high < _row(rows, "sideslip", "zero sideslip").low
+
+
+def test_sideslip_on_tiles_beats_zero_and_on_rubber_below_the_limit():
+    tiles = _published("dart_taped_tyres_tiles_ramp", "dugoff_ekf")
+    zero = _row(tiles, "sideslip", "zero sideslip")
+    assert _row(tiles, "sideslip", "dugoff_ekf").high < zero.low
+    rubber = score_published(["dart_rubber_floor_ramp"], ["dugoff_ekf"], by_excitation=True)
+    high = [row for row in rubber if row.excitation == "high"]
+    assert _row(high, "sideslip", "dugoff_ekf").high < _row(high, "sideslip", "zero sideslip").low
+
+
+def test_settings_of_the_user_come_before_those_of_the_map():
+    name = "dart_rubber_floor_ramp"
+    rows = _published(name, "dugoff_ekf", "dugoff_ekf@friction=0.6")
+    own, other = (_row(rows, "sideslip", f"dugoff_ekf{s}") for s in ("", "@friction=0.6"))
+    assert own.value != other.value
+
+
+def test_few_blocks_give_no_interval():
+    bound = Bounds("mu", 0.0, 10.0, 42.0, 43.5)
+    row = _row(score_recordings([_turning(bounds=(bound,))], []), "mu", "largest |a|/g so far")
+    assert row.value is not None
+    assert np.isnan(row.low)
+    assert np.isnan(row.high)
