@@ -38,6 +38,6 @@ class VelocityFrictionEkf(CompiledMethod):
     variances = ("mu",)
     vehicle_parameters = FRICTION_VEHICLE
     parameters = FRICTION_PARAMETERS
-    variants = {"small_car": {"least_speed": 0.8}}  # noqa: RUF012
+    variants = {"small_car": {"least_speed": 0.8}}
     state = FRICTION_STATE
     step = staticmethod(_step)
