@@ -9,7 +9,6 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -21,29 +20,27 @@ from gripbench.bench.store import Store
 def main(arguments: str, results: str, warm: str, kills: int) -> None:
     chosen = json.loads(arguments)
     gripbench.run(**{**chosen, "seeds": 2}, results=warm)  # compiles
-    start = _seconds(lambda: gripbench.run(**{**chosen, "seeds": 2}, results=warm))
-    more = _seconds(lambda: gripbench.run(**{**chosen, "seeds": 22}, results=warm)) - start
-    work = max(more, 0.0) * chosen["seeds"] / 20
-    longest = 1.2 * start + 1.5 * work / kills  # all kills together: before the run is complete
+    cells = chosen["seeds"] * len(chosen["methods"])
     generator = np.random.default_rng(5)
     kept = []
-    for _ in range(kills):
+    # the kills follow the rows and not the clock: on a busy machine, too, each hits a run at work
+    for rows in sorted(generator.integers(0, int(0.9 * cells), size=kills)):
         child = os.fork()
         if child == 0:
             gripbench.run(**chosen, results=results)
             os._exit(0)
-        time.sleep(generator.uniform(0.0, longest))
+        while _stored(results) < rows:
+            time.sleep(0.001)
+        time.sleep(generator.uniform(0.0, 0.01))
         os.kill(child, signal.SIGKILL)
         _, status = os.waitpid(child, 0)
         if os.WIFSIGNALED(status):
-            kept.append(sum(1 for _ in Store(Path(results)).files()))
+            kept.append(_stored(results))
     print(json.dumps(kept))
 
 
-def _seconds(action: Callable[[], object]) -> float:
-    began = time.perf_counter()
-    action()
-    return time.perf_counter() - began
+def _stored(results: str) -> int:
+    return sum(1 for _ in Store(Path(results)).files())
 
 
 if __name__ == "__main__":
