@@ -171,7 +171,7 @@ _BODY = (
     ),
     Signal("position_x", "m", "earth", "north", "", "Position of the centre of gravity, north"),
     Signal("position_y", "m", "earth", "west", "", "Position of the centre of gravity, west"),
-    Signal("speed_y", "m/s", "vehicle", "left", "", "Lateral velocity v_y"),
+    Signal("speed_y", "m/s", "vehicle", "left", SPEED_SENSOR, "Lateral velocity v_y"),
     Signal("sideslip", "rad", "vehicle", "moving left", "", "Sideslip angle atan2(v_y, v_x)"),
     Signal("mu", "-", "-", "-", "", "Available friction coefficient, mean of the four wheels"),
     Signal("force_y_front", "N", "wheel", "left", "", "Lateral tyre force, front axle"),
