@@ -87,8 +87,34 @@ def _describe(model: type[BaseModel], detail: ErrorDetails) -> str:
         return f"unknown key '{key}': {hint}"
     if detail["type"] == "missing":
         return f"missing key '{key}'"
+    message += _allowed(model, location)
     shown = "" if isinstance(detail["input"], Mapping | list) else f" (given {detail['input']!r})"
     return f"key '{key}': {message}{shown}"
+
+
+def _allowed(model: type[BaseModel], location: list[str]) -> str:
+    """Return the whole range of a number's key, where the model gives both of its ends."""
+    current: Any = model
+    for part in location:
+        fields = getattr(current, "model_fields", {})
+        if part not in fields:
+            continue
+        field = fields[part]
+        if part == location[-1]:
+            low = _bound(field.metadata, {"ge": "from", "gt": "above"})
+            high = _bound(field.metadata, {"le": "to", "lt": "below"})
+            return f", allowed is {low} {high}" if low and high else ""
+        current = _model_in(field.annotation)
+    return ""
+
+
+def _bound(metadata: list[Any], words: Mapping[str, str]) -> str:
+    """Return one end of a range in words, empty if there is none."""
+    for item in metadata:
+        for name, word in words.items():
+            if getattr(item, name, None) is not None:
+                return f"{word} {getattr(item, name):g}"
+    return ""
 
 
 def _keys_beside(model: type[BaseModel], location: list[str]) -> list[str]:

@@ -42,6 +42,10 @@ def reproduce_paper(paper: str, directory: Path) -> list[str]:
     files = paper_files()
     if paper not in files:
         raise unknown("paper", paper, files)
+    try:
+        directory.mkdir(parents=True, exist_ok=True)  # before the work, which would be in vain
+    except OSError as error:
+        raise GripbenchError(f"{directory}: cannot be written ({error.strerror})") from None
     if read_toml(files[paper]).get("kind") == "tables":
         return _reproduce_tables(paper, directory)
     return _reproduce_claims(paper, directory)

@@ -20,6 +20,7 @@ PAGES = (
     "docs/add-a-vehicle.md",
     "docs/contract.md",
     "docs/figures.md",
+    "docs/ranking.md",
     "docs/api.md",
 )
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.DOTALL | re.MULTILINE)

@@ -100,7 +100,7 @@ def _file(tmp_path, old, new):
     ("old", "new", "message"),
     [
         ("horizon = 30.0", "horizn = 30.0", "unknown key 'horizn': did you mean 'horizon'"),
-        ("horizon = 30.0", "horizon = 0.0", r"key 'horizon'.*greater than 0 \(given 0\.0\)"),
+        ("horizon = 30.0", "horizon = 0.0", r"key 'horizon'.*greater than 0.*\(given 0\.0\)"),
         ("horizon = 30.0", "horizon = -3.0", "key 'horizon'.*greater than 0"),
         ("horizon = 30.0", "horizon = 1e-4", "shorter than one sample"),
         ("horizon = 30.0", "horizon = 31.0", "friction ends at 30 s, before the horizon"),
