@@ -45,7 +45,13 @@ def load_recording(name: str, folder: Path | None = None) -> ImportedLog:
     for file in channel_map.log_files().values():
         if not (place / file.path).is_file():
             raise AbsentDataError(
-                f"{name}: {file.path} is not in {place}; get it from {channel_map.source} and "
-                f"set {VARIABLE} to its folder"
+                f"{name}: {file.path} is not in {_shown(place)}; get it from "
+                f"{channel_map.source} and set {VARIABLE} to its folder"
             )
     return import_log(place, maps[name])
+
+
+def _shown(place: Path) -> str:
+    """Name a folder without the user's home: results that are published may quote it."""
+    home = Path.home()
+    return f"~/{place.relative_to(home).as_posix()}" if place.is_relative_to(home) else str(place)
