@@ -42,17 +42,22 @@ def reproduce_paper(paper: str, directory: Path) -> list[str]:
     files = paper_files()
     if paper not in files:
         raise unknown("paper", paper, files)
-    try:
-        directory.mkdir(parents=True, exist_ok=True)  # before the work, which would be in vain
-    except OSError as error:
-        raise GripbenchError(f"{directory}: cannot be written ({error.strerror})") from None
     if read_toml(files[paper]).get("kind") == "tables":
         return _reproduce_tables(paper, directory)
     return _reproduce_claims(paper, directory)
 
 
+def _make(directory: Path) -> None:
+    """Make the folder once the input is known to be right, before work that would be in vain."""
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise GripbenchError(f"{directory}: cannot be written ({error.strerror})") from None
+
+
 def _reproduce_tables(name: str, directory: Path) -> list[str]:
     paper = paper_tables.load_paper_tables(name)
+    _make(directory)
     with _progress() as progress:
         task = progress.add_task(f"{name}: recordings", total=paper_tables.recordings_of(paper))
         outcome = paper_tables.reproduce(paper, lambda: progress.advance(task))
@@ -152,6 +157,8 @@ def _idealised(
 
 
 def _reproduce_claims(name: str, directory: Path) -> list[str]:
+    load_paper(name)
+    _make(directory)
     module = importlib.import_module(f"gripbench.bench.reproductions.{name}")
     with _progress() as progress:
         task = progress.add_task(name, total=None)
