@@ -21,15 +21,15 @@ import os
 import sys
 from typing import TYPE_CHECKING, Any
 
-from gripbench.envs.registration import register_environments
+from gripbench.envs.gym.registration import register_environments
 
 if TYPE_CHECKING:
-    from gripbench.bench.api import run
-    from gripbench.bench.check import check_estimator
-    from gripbench.bench.ranking import rank
-    from gripbench.bench.registry import register
-    from gripbench.bench.store import read_rows
-    from gripbench.bench.summary import summary
+    from gripbench.bench.catalogue.check import check_estimator
+    from gripbench.bench.catalogue.registry import register
+    from gripbench.bench.ranking.ranking import rank
+    from gripbench.bench.ranking.summary import summary
+    from gripbench.bench.running.api import run
+    from gripbench.bench.running.store import read_rows
     from gripbench.envs.worlds import load_scenario, record
     from gripbench.methods.contract import CompiledMethod, Estimator, Parameter, compiled
 
@@ -48,15 +48,15 @@ DEFINED_IN = {
     "CompiledMethod": "gripbench.methods.contract",
     "Estimator": "gripbench.methods.contract",
     "Parameter": "gripbench.methods.contract",
-    "check_estimator": "gripbench.bench.check",
+    "check_estimator": "gripbench.bench.catalogue.check",
     "compiled": "gripbench.methods.contract",
     "load_scenario": "gripbench.envs.worlds",
-    "rank": "gripbench.bench.ranking",
-    "read_rows": "gripbench.bench.store",
+    "rank": "gripbench.bench.ranking.ranking",
+    "read_rows": "gripbench.bench.running.store",
     "record": "gripbench.envs.worlds",
-    "register": "gripbench.bench.registry",
-    "run": "gripbench.bench.api",
-    "summary": "gripbench.bench.summary",
+    "register": "gripbench.bench.catalogue.registry",
+    "run": "gripbench.bench.running.api",
+    "summary": "gripbench.bench.ranking.summary",
 }
 """The module behind each public name."""
 

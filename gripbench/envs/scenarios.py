@@ -7,7 +7,7 @@ from typing import Self
 from pydantic import Field, field_validator, model_validator
 
 from gripbench.configuration import Configuration
-from gripbench.envs.sensors import Sensor, load_sensor_suite
+from gripbench.envs.instruments.sensors import Sensor, load_sensor_suite
 from gripbench.envs.signals import signal
 from gripbench.errors import GripbenchError
 

@@ -10,13 +10,17 @@ from typing import Any
 import numpy as np
 
 from gripbench.configuration import CONFIGS, parse, read_toml
-from gripbench.envs.bicycle import BicycleScenario, BicycleSimulation
-from gripbench.envs.longitudinal import PAPER_SOLVER, LongitudinalScenario, LongitudinalSimulation
-from gripbench.envs.planar import PlanarScenario, PlanarSimulation
+from gripbench.envs.instruments.sensors import SensorSuite
+from gripbench.envs.plants.bicycle import BicycleScenario, BicycleSimulation
+from gripbench.envs.plants.longitudinal.world import (
+    PAPER_SOLVER,
+    LongitudinalScenario,
+    LongitudinalSimulation,
+)
+from gripbench.envs.plants.planar.world import PlanarScenario, PlanarSimulation
+from gripbench.envs.plants.simulation import Simulation
 from gripbench.envs.recordings import Recording
 from gripbench.envs.scenarios import Scenario
-from gripbench.envs.sensors import SensorSuite
-from gripbench.envs.simulation import Simulation
 from gripbench.envs.vehicles import Vehicle, load_vehicle
 from gripbench.errors import InputError, nearest, unknown
 

@@ -31,9 +31,9 @@ from math import atan2, cos, sin, sqrt
 import numpy as np
 
 from gripbench.envs.vehicles import GRAVITY
+from gripbench.methods.blocks.dugoff_tyre import dugoff_force, dugoff_slips
+from gripbench.methods.blocks.kalman import correct_scalar, filter_type, predict_covariance
 from gripbench.methods.contract import CompiledMethod, Parameter, compiled
-from gripbench.methods.dugoff_tyre import dugoff_force, dugoff_slips
-from gripbench.methods.kalman import correct_scalar, filter_type, predict_covariance
 
 DUGOFF_STATE = np.dtype(
     [

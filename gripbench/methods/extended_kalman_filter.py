@@ -22,7 +22,7 @@ from __future__ import annotations
 import numpy as np
 
 from gripbench.envs.vehicles import GRAVITY
-from gripbench.methods.axle_friction import (
+from gripbench.methods.blocks.axle_friction import (
     AXLE_FRICTION_PARAMETERS,
     AXLE_FRICTION_STATE,
     AXLE_FRICTION_VEHICLE,
@@ -30,12 +30,12 @@ from gripbench.methods.axle_friction import (
     estimate_friction,
     start_friction,
 )
-from gripbench.methods.contract import CompiledMethod, Parameter, compiled
-from gripbench.methods.kalman import correct_scalar, filter_type, predict
-from gripbench.methods.longitudinal_model import (
+from gripbench.methods.blocks.kalman import correct_scalar, filter_type, predict
+from gripbench.methods.blocks.longitudinal_model import (
     RESISTANCE_PARAMETERS,
 )
-from gripbench.methods.rls import MAGIC_FORMULA, PRINTED
+from gripbench.methods.blocks.rls import MAGIC_FORMULA, PRINTED
+from gripbench.methods.contract import CompiledMethod, Parameter, compiled
 
 SPEED, WHEEL_FRONT, WHEEL_REAR, FORCE_FRONT, FORCE_REAR = 0, 1, 2, 3, 4
 

@@ -27,14 +27,14 @@ from __future__ import annotations
 import numpy as np
 
 from gripbench.envs.vehicles import GRAVITY
-from gripbench.methods.contract import CompiledMethod, Parameter, compiled
-from gripbench.methods.kalman import (
+from gripbench.methods.blocks.kalman import (
     correct,
     correct_scalar,
     filter_type,
     innovation_distance,
     predict_covariance,
 )
+from gripbench.methods.contract import CompiledMethod, Parameter, compiled
 
 _DEGREE = np.pi / 180.0
 _PITCH_HISTORY = 2048

@@ -17,7 +17,7 @@ from math import expm1
 
 import numpy as np
 
-from gripbench.methods.axle_friction import (
+from gripbench.methods.blocks.axle_friction import (
     AXLE_FRICTION_PARAMETERS,
     AXLE_FRICTION_STATE,
     AXLE_FRICTION_VEHICLE,
@@ -25,12 +25,12 @@ from gripbench.methods.axle_friction import (
     estimate_friction,
     start_friction,
 )
-from gripbench.methods.contract import CompiledMethod, Parameter, compiled
-from gripbench.methods.longitudinal_model import (
+from gripbench.methods.blocks.longitudinal_model import (
     RESISTANCE_PARAMETERS,
     total_force,
 )
-from gripbench.methods.rls import MAGIC_FORMULA, PRINTED
+from gripbench.methods.blocks.rls import MAGIC_FORMULA, PRINTED
+from gripbench.methods.contract import CompiledMethod, Parameter, compiled
 
 _NAMES = (
     "time",

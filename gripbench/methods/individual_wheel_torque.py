@@ -18,7 +18,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from gripbench.methods.axle_friction import (
+from gripbench.methods.blocks.axle_friction import (
     AXLE_FRICTION_PARAMETERS,
     AXLE_FRICTION_STATE,
     AXLE_FRICTION_VEHICLE,
@@ -26,8 +26,8 @@ from gripbench.methods.axle_friction import (
     estimate_friction,
     start_friction,
 )
+from gripbench.methods.blocks.rls import MAGIC_FORMULA, PRINTED
 from gripbench.methods.contract import CompiledMethod, Parameter, compiled
-from gripbench.methods.rls import MAGIC_FORMULA, PRINTED
 
 _inline = numba.njit(inline="always", error_model="numpy")
 

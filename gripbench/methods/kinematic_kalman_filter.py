@@ -21,9 +21,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from gripbench.methods.blocks.course_history import (
+    HISTORY,
+    change_since,
+    is_usable,
+    remember,
+    wrapped,
+)
+from gripbench.methods.blocks.kalman import correct_scalar, filter_type, predict_covariance
 from gripbench.methods.contract import CompiledMethod, Parameter, compiled
-from gripbench.methods.course_history import HISTORY, change_since, is_usable, remember, wrapped
-from gripbench.methods.kalman import correct_scalar, filter_type, predict_covariance
 
 KINEMATIC_STATE = np.dtype(
     [

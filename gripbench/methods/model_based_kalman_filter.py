@@ -23,10 +23,16 @@ from __future__ import annotations
 import numpy as np
 
 from gripbench.envs.vehicles import GRAVITY
+from gripbench.methods.blocks.course_history import (
+    HISTORY,
+    change_since,
+    is_usable,
+    remember,
+    wrapped,
+)
+from gripbench.methods.blocks.discretisation import exponential
+from gripbench.methods.blocks.kalman import correct_scalar, filter_type, predict_covariance
 from gripbench.methods.contract import CompiledMethod, Parameter, compiled
-from gripbench.methods.course_history import HISTORY, change_since, is_usable, remember, wrapped
-from gripbench.methods.discretisation import exponential
-from gripbench.methods.kalman import correct_scalar, filter_type, predict_covariance
 
 MODEL_BASED_STATE = np.dtype(
     [

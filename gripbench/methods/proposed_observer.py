@@ -34,7 +34,7 @@ import numba
 import numpy as np
 
 from gripbench.envs.vehicles import GRAVITY
-from gripbench.methods.axle_friction import (
+from gripbench.methods.blocks.axle_friction import (
     AXLE_FRICTION_PARAMETERS,
     AXLE_FRICTION_STATE,
     AXLE_FRICTION_VEHICLE,
@@ -42,14 +42,14 @@ from gripbench.methods.axle_friction import (
     estimate_friction,
     start_friction,
 )
-from gripbench.methods.contract import CompiledMethod, Parameter, compiled
-from gripbench.methods.longitudinal_model import (
+from gripbench.methods.blocks.longitudinal_model import (
     RESISTANCE_PARAMETERS,
     front_load,
     rear_load,
     total_force,
 )
-from gripbench.methods.rls import PRINTED
+from gripbench.methods.blocks.rls import PRINTED
+from gripbench.methods.contract import CompiledMethod, Parameter, compiled
 
 SMALL_SLIP = 1e-5
 """Slip ratio below which the normalised law of the stiffness fades out."""

@@ -22,8 +22,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from gripbench.methods.blocks.kalman import correct_scalar, filter_type, predict
 from gripbench.methods.contract import Parameter, compiled
-from gripbench.methods.kalman import correct_scalar, filter_type, predict
 
 IGNORE_DELAY, REPLAY, LARSEN = 0.0, 1.0, 2.0
 """Values of the parameter `delay_handling`."""

@@ -13,9 +13,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gripbench.envs.tyres import slip_ratio
-from gripbench.methods.contract import CompiledMethod, Parameter, compiled
-from gripbench.methods.longitudinal_model import (
+from gripbench.envs.tyres.longitudinal import slip_ratio
+from gripbench.methods.blocks.longitudinal_model import (
     AXLE_LOAD_PARAMETERS,
     RESISTANCE_PARAMETERS,
     TYRE_PARAMETERS,
@@ -23,7 +22,7 @@ from gripbench.methods.longitudinal_model import (
     rear_load,
     total_force,
 )
-from gripbench.methods.rls import (
+from gripbench.methods.blocks.rls import (
     FRICTION_MAP_PARAMETERS,
     MAGIC_FORMULA,
     PRINTED,
@@ -34,6 +33,7 @@ from gripbench.methods.rls import (
     rls,
     slip_regressor,
 )
+from gripbench.methods.contract import CompiledMethod, Parameter, compiled
 
 STATE = np.dtype([(name, np.float64) for name in ("time", "samples", "slope", "covariance", "mu")])
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 import gripbench
-from gripbench.bench.store import Store
+from gripbench.bench.running.store import Store
 
 
 def main(arguments: str, results: str, warm: str, kills: int) -> None:

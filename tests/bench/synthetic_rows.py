@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gripbench.bench.rows import Row, Runtime, Stratum, TargetScore, frame_of
+from gripbench.bench.running.rows import Row, Runtime, Stratum, TargetScore, frame_of
 
 TORQUE = ("torque_front", "wheel_speed_front", "accel_x")
 GPS = (*TORQUE, "speed_gps")

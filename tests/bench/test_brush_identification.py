@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gripbench.bench.brush_identification import (
+from gripbench.bench.papers.yoon2015.brush_identification import (
     PARAMETERS,
     LateralTest,
     brush_lateral_force,

@@ -5,8 +5,15 @@ import time
 
 import pytest
 
-from gripbench.bench.check import CHECKS, EXPECTED, PASSED, SKIPPED, check_estimator, failures
-from gripbench.bench.registry import built_in_methods
+from gripbench.bench.catalogue.check import (
+    CHECKS,
+    EXPECTED,
+    PASSED,
+    SKIPPED,
+    check_estimator,
+    failures,
+)
+from gripbench.bench.catalogue.registry import built_in_methods
 from gripbench.errors import InputError
 
 SCENARIO = ("constant_mu",)

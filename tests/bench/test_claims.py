@@ -5,7 +5,7 @@ import math
 import pytest
 from pydantic import ValidationError
 
-from gripbench.bench.claims import (
+from gripbench.bench.papers.claims import (
     Paper,
     PublishedClaim,
     Seeds,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from gripbench.bench.consistency import chi_square_test, normalised_squares, whiteness_test
+from gripbench.bench.scoring.consistency import chi_square_test, normalised_squares, whiteness_test
 from gripbench.errors import InputError
 
 

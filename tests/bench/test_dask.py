@@ -6,11 +6,11 @@ import signal
 import pytest
 
 import gripbench
-from gripbench.bench.api import plan_of
-from gripbench.bench.backends import Backend
-from gripbench.bench.runner import run_plan
-from gripbench.bench.store import Store, read_rows
-from gripbench.bench.summary import scores_csv
+from gripbench.bench.ranking.summary import scores_csv
+from gripbench.bench.running.api import plan_of
+from gripbench.bench.running.backends import Backend
+from gripbench.bench.running.runner import run_plan
+from gripbench.bench.running.store import Store, read_rows
 
 distributed = pytest.importorskip("distributed")
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from gripbench.bench import leaderboard, method_pages
-from gripbench.bench.registry import built_in_methods
+from gripbench.bench.catalogue.registry import built_in_methods
+from gripbench.bench.publishing import leaderboard, method_pages
 
 ROOT = Path(__file__).parents[2]
 PAGES = (

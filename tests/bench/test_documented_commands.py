@@ -8,7 +8,7 @@ import pytest
 import typer.main
 
 from gripbench.bench.command_line import application
-from gripbench.bench.ranking import COLUMNS
+from gripbench.bench.ranking.ranking import COLUMNS
 
 ROOT = Path(__file__).parents[2]
 FILES = (".github/workflows/benchmark.yml", "docs/ranking.md", "docs/leaderboard.md")

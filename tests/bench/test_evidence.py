@@ -2,8 +2,8 @@
 
 import pytest
 
-from gripbench.bench.evidence import li2014
-from gripbench.bench.paper_tables import load_paper_tables
+from gripbench.bench.papers.li2014 import evidence as li2014
+from gripbench.bench.papers.tables import load_paper_tables
 
 
 @pytest.fixture(scope="module")

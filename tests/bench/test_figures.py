@@ -7,11 +7,11 @@ from typer.testing import CliRunner
 
 from gripbench.bench.command_line import application
 from gripbench.bench.commands.plot import split_methods
-from gripbench.bench.figures.catalogue import PAPERS, choose, paper_figures, write_figures
-from gripbench.bench.figures.panels import Panel, draw_panels, error_panel, signal_panel
-from gripbench.bench.figures.run_plot import run_plot
-from gripbench.bench.figures.runs import Runs
-from gripbench.bench.figures.style import (
+from gripbench.bench.papers.figures import PAPERS, choose, paper_figures, write_figures
+from gripbench.bench.papers.panels import Panel, draw_panels, error_panel, signal_panel
+from gripbench.bench.publishing.figures.run_plot import run_plot
+from gripbench.bench.publishing.figures.runs import Runs
+from gripbench.bench.publishing.figures.style import (
     SERIES,
     TRUTH,
     axis_label,

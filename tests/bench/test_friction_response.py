@@ -6,16 +6,16 @@ import synthetic_rows
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gripbench.bench.friction_response import (
+from gripbench.bench.ranking.summary import summary
+from gripbench.bench.running.rows import FrictionResponse, frame_of
+from gripbench.bench.scoring.friction_response import (
     BAND,
     EXCITED,
     HOLD,
     friction_response,
     is_available_friction,
 )
-from gripbench.bench.rows import FrictionResponse, frame_of
-from gripbench.bench.scoring import score
-from gripbench.bench.summary import summary
+from gripbench.bench.scoring.scoring import score
 from gripbench.envs.recordings import Recording
 from gripbench.envs.signals import record_type
 from gripbench.envs.vehicles import GRAVITY

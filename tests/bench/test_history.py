@@ -5,12 +5,12 @@ import pytest
 from synthetic_rows import GPS, noisy_rows, row
 from typer.testing import CliRunner
 
-from gripbench.bench import history, tables
 from gripbench.bench.command_line import application
-from gripbench.bench.history import Commit, HistoryRow
-from gripbench.bench.leaderboard import build, write
-from gripbench.bench.rows import frame_of
-from gripbench.bench.timings import RelativeRuntime
+from gripbench.bench.publishing import history, tables
+from gripbench.bench.publishing.history import Commit, HistoryRow
+from gripbench.bench.publishing.leaderboard import build, write
+from gripbench.bench.publishing.timings import RelativeRuntime
+from gripbench.bench.running.rows import frame_of
 from gripbench.errors import InputError
 
 RUNTIMES = {"a": {"batch": RelativeRuntime(relative=1.5, step=1e-8)}}

@@ -9,8 +9,8 @@ import pandas as pd
 import pytest
 
 import gripbench
-from gripbench.bench.cage import Cage, CellFailure, Limits
-from gripbench.bench.registry import choose_method
+from gripbench.bench.catalogue.registry import choose_method
+from gripbench.bench.running.sandbox import Cage, CellFailure, Limits
 from gripbench.errors import InputError
 
 FAULTS = {

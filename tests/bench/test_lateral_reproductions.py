@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from gripbench.bench.claims import changed_verdicts, load_paper
-from gripbench.bench.reproductions import anderson2004, dakhlallah2008
+from gripbench.bench.papers.anderson2004 import reproduction as anderson2004
+from gripbench.bench.papers.claims import changed_verdicts, load_paper
+from gripbench.bench.papers.dakhlallah2008 import reproduction as dakhlallah2008
 from gripbench.envs.worlds import load_scenario, record
 
 

@@ -6,12 +6,12 @@ import pytest
 from synthetic_rows import GPS, noisy_frame, noisy_rows, row, score
 from typer.testing import CliRunner
 
-from gripbench.bench import leaderboard, timings
 from gripbench.bench.command_line import application
-from gripbench.bench.leaderboard import build, read, write
-from gripbench.bench.rows import frame_of
-from gripbench.bench.store import Store
-from gripbench.bench.timings import REFERENCE, read_timings, reference_kernel
+from gripbench.bench.publishing import leaderboard, timings
+from gripbench.bench.publishing.leaderboard import build, read, write
+from gripbench.bench.publishing.timings import REFERENCE, read_timings, reference_kernel
+from gripbench.bench.running.rows import frame_of
+from gripbench.bench.running.store import Store
 from gripbench.errors import InputError
 
 

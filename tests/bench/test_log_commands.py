@@ -8,8 +8,8 @@ import pytest
 from typer.testing import CliRunner
 
 from gripbench.bench.command_line import application
-from gripbench.envs.logs.storing import load
 from gripbench.errors import InputError
+from gripbench.logs.storing import load
 
 
 def _run(*arguments):

@@ -3,10 +3,10 @@
 import tracemalloc
 
 import gripbench
-from gripbench.bench.api import plan_of
-from gripbench.bench.backends import Backend
-from gripbench.bench.runner import run_plan
-from gripbench.bench.store import Store
+from gripbench.bench.running.api import plan_of
+from gripbench.bench.running.backends import Backend
+from gripbench.bench.running.runner import run_plan
+from gripbench.bench.running.store import Store
 
 
 def peak(scenario, seeds, results, on_row):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gripbench.bench.observability import dugoff_observability, observability_matrix
+from gripbench.bench.scoring.observability import dugoff_observability, observability_matrix
 from gripbench.envs.worlds import load_scenario, record
 from gripbench.methods.dugoff_ekf import DugoffEkf
 

@@ -6,9 +6,11 @@ import math
 import pytest
 from typer.testing import CliRunner
 
-from gripbench.bench import command_line, paper_comparison, paper_tables
+from gripbench.bench import command_line
 from gripbench.bench.command_line import application
-from gripbench.bench.paper_tables import Cell, Outcome, load_paper_tables, reproduce
+from gripbench.bench.papers import comparison as paper_comparison
+from gripbench.bench.papers import tables as paper_tables
+from gripbench.bench.papers.tables import Cell, Outcome, load_paper_tables, reproduce
 from gripbench.configuration import parse, read_toml
 from gripbench.errors import InputError
 

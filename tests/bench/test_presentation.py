@@ -7,9 +7,9 @@ import pytest
 import synthetic_rows
 from rich.console import Console
 
-from gripbench.bench import presentation
-from gripbench.bench.rows import FrictionResponse, frame_of
-from gripbench.bench.summary import summary
+from gripbench.bench.publishing import presentation
+from gripbench.bench.ranking.summary import summary
+from gripbench.bench.running.rows import FrictionResponse, frame_of
 
 SCENARIOS = tuple(f"a_scenario_with_a_long_name_{k}" for k in range(9))
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from gripbench.bench import leaderboard
+from gripbench.bench.catalogue.registry import load_suite
 from gripbench.bench.command_line import application
 from gripbench.bench.commands.publish import publish_paper
-from gripbench.bench.registry import load_suite
+from gripbench.bench.publishing import leaderboard
 
 pytest.importorskip("plotly", reason="the report needs the extra 'report'")
 

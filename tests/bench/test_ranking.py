@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from synthetic_rows import GPS, IDEAL, TORQUE, noisy_frame, noisy_rows, row, score
 
-from gripbench.bench.grids import instruments
-from gripbench.bench.ranking import COLUMNS, boards, rank
-from gripbench.bench.rows import Runtime, frame_of
+from gripbench.bench.ranking.grids import instruments
+from gripbench.bench.ranking.ranking import COLUMNS, boards, rank
+from gripbench.bench.running.rows import Runtime, frame_of
 from gripbench.errors import InputError
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 import gripbench
-from gripbench.bench.summary import scores_csv
+from gripbench.bench.ranking.summary import scores_csv
 
 pytest.importorskip("ray", reason="needs: pip install 'gripbench[ray]'")
 

@@ -5,13 +5,13 @@ import dataclasses
 import numpy as np
 import pytest
 
-from gripbench.bench.recorded import score_published, score_recordings, scored_samples
-from gripbench.bench.registry import choose_method
-from gripbench.bench.tuning import tune
-from gripbench.envs.logs.published import AbsentDataError, load_recording
+from gripbench.bench.catalogue.registry import choose_method
+from gripbench.bench.running.recorded import score_published, score_recordings, scored_samples
+from gripbench.bench.running.tuning import tune
 from gripbench.envs.recordings import Bounds, Recording
 from gripbench.envs.signals import record_type
 from gripbench.errors import InputError
+from gripbench.logs.published import AbsentDataError, load_recording
 
 
 def _turning(bias=0.0, windows=None, bounds=()):

@@ -10,29 +10,29 @@ import pytest
 from typer.testing import CliRunner
 
 import gripbench
-from gripbench.bench.api import plan_of
+from gripbench.bench.catalogue.registry import choose_method
 from gripbench.bench.command_line import application
-from gripbench.bench.ranking import boards
-from gripbench.bench.recorded import score_recordings
-from gripbench.bench.recorded_scenarios import (
+from gripbench.bench.ranking.ranking import boards
+from gripbench.bench.running.api import plan_of
+from gripbench.bench.running.recorded import score_recordings
+from gripbench.bench.running.recorded_scenarios import (
     judged,
     on_recording,
     recorded_scenario,
     recording_of,
     windows_of,
 )
-from gripbench.bench.registry import choose_method
-from gripbench.bench.rows import pooled_rms
-from gripbench.bench.runner import run_plan
-from gripbench.bench.store import Store
-from gripbench.envs.logs.channel_map import ChannelMap
-from gripbench.envs.logs.excitation import utilisation_bound
-from gripbench.envs.logs.importing import import_frame
-from gripbench.envs.logs.published import AbsentDataError, load_recording
-from gripbench.envs.logs.storing import load, store
+from gripbench.bench.running.rows import pooled_rms
+from gripbench.bench.running.runner import run_plan
+from gripbench.bench.running.store import Store
 from gripbench.envs.recordings import Bounds, Recording
 from gripbench.envs.signals import record_type
 from gripbench.errors import InputError
+from gripbench.logs.channel_map import ChannelMap
+from gripbench.logs.excitation import utilisation_bound
+from gripbench.logs.importing import import_frame
+from gripbench.logs.published import AbsentDataError, load_recording
+from gripbench.logs.storing import load, store
 
 METHOD = "kinematic_kalman_filter"
 MAP = {

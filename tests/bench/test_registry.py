@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 import gripbench
-from gripbench.bench import registry
-from gripbench.bench.registry import (
+from gripbench.bench.catalogue import registry
+from gripbench.bench.catalogue.registry import (
     choose_method,
     find_scenario,
     load_suite,

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from synthetic_rows import noisy_rows, row
 
-from gripbench.bench.leaderboard import Leaderboard, runs_of
-from gripbench.bench.regressions import changes_table, compare
-from gripbench.bench.rows import frame_of
-from gripbench.bench.timings import RelativeRuntime
+from gripbench.bench.publishing.leaderboard import Leaderboard, runs_of
+from gripbench.bench.publishing.regressions import changes_table, compare
+from gripbench.bench.publishing.timings import RelativeRuntime
+from gripbench.bench.running.rows import frame_of
 from gripbench.errors import InputError
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gripbench.bench.riccati import steady_state
+from gripbench.bench.papers.anderson2004.riccati import steady_state
 from gripbench.envs.signals import record_type
 from gripbench.envs.vehicles import load_vehicle
 from gripbench.methods.model_based_kalman_filter import ModelBasedKalmanFilter

@@ -11,12 +11,12 @@ from pathlib import Path
 import pytest
 
 import gripbench
-from gripbench.bench import runner
-from gripbench.bench.backends import Backend, WorkerLostError
-from gripbench.bench.registry import choose_method, find_scenario
-from gripbench.bench.runner import Plan, run_plan
-from gripbench.bench.store import Store, read_rows
-from gripbench.bench.summary import scores_csv
+from gripbench.bench.catalogue.registry import choose_method, find_scenario
+from gripbench.bench.ranking.summary import scores_csv
+from gripbench.bench.running import runner
+from gripbench.bench.running.backends import Backend, WorkerLostError
+from gripbench.bench.running.runner import Plan, run_plan
+from gripbench.bench.running.store import Store, read_rows
 from gripbench.errors import InputError
 
 METHODS = ("slip_slope", "individual_wheel_torque")
@@ -140,7 +140,7 @@ def test_a_scenario_that_cannot_be_simulated_leaves_rows(plan, tmp_path, monkeyp
     def fail(scenario, seed):
         raise ArithmeticError("no convergence")
 
-    monkeypatch.setattr("gripbench.bench.cells.recording_of", fail)
+    monkeypatch.setattr("gripbench.bench.running.cells.recording_of", fail)
     report = run(plan, tmp_path)
     assert report.statuses == {"failed": 6}
     reason = read_rows(tmp_path)["reason"].iloc[0]

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gripbench.bench.scoring import BAND, HOLD, DivergedError, EstimateError, score
+from gripbench.bench.scoring.scoring import BAND, HOLD, DivergedError, EstimateError, score
 from gripbench.envs.recordings import Recording
 from gripbench.envs.signals import record_type
 

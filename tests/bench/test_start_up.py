@@ -35,6 +35,8 @@ def test_run_and_what_it_prints_need_no_figures_and_no_other_formats(short_scena
     assert loaded.isdisjoint({*HEAVY, "scipy.special"})
 
 
-@pytest.mark.parametrize("module", ["gripbench", "gripbench.bench.api", "gripbench.bench.ranking"])
+@pytest.mark.parametrize(
+    "module", ["gripbench", "gripbench.bench.running.api", "gripbench.bench.ranking.ranking"]
+)
 def test_the_python_interface_needs_no_figures(module):
     assert loaded_by(f"import {module}").isdisjoint(HEAVY)

@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from gripbench.bench import statistics
-from gripbench.bench.pareto import pareto_front
-from gripbench.bench.rows import pooled_rms
+from gripbench.bench.ranking import statistics
+from gripbench.bench.ranking.pareto import pareto_front
+from gripbench.bench.running.rows import pooled_rms
 from gripbench.errors import InputError
 
 

@@ -8,9 +8,16 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from gripbench.bench import rows, store
-from gripbench.bench.rows import Row, Stratum, TargetScore, pooled_rms, row_from
-from gripbench.bench.store import DamagedRowError, Store, leftovers, read_row, read_rows, seal
+from gripbench.bench.running import rows, store
+from gripbench.bench.running.rows import Row, Stratum, TargetScore, pooled_rms, row_from
+from gripbench.bench.running.store import (
+    DamagedRowError,
+    Store,
+    leftovers,
+    read_row,
+    read_rows,
+    seal,
+)
 from gripbench.errors import InputError
 
 SAMPLES = Path(__file__).parent / "stored_rows"

@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from gripbench.bench import latex, tables
-from gripbench.bench.tables import Column, Table
+from gripbench.bench.publishing import latex, tables
+from gripbench.bench.publishing.tables import Column, Table
 from gripbench.errors import InputError
 
 COLUMNS = (

@@ -8,9 +8,9 @@ import pytest
 from typer.testing import CliRunner
 
 import gripbench
+from gripbench.bench.catalogue.declarations import declaration_of
 from gripbench.bench.command_line import application
-from gripbench.bench.declarations import declaration_of
-from gripbench.bench.execution import execute
+from gripbench.bench.running.execution import execute
 
 ROOT = Path(__file__).parents[2]
 

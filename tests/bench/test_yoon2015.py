@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from gripbench.bench.claims import load_paper
-from gripbench.bench.reproductions import yoon2015
-from gripbench.bench.reproductions.yoon2015 import friction_error_and_delay
+from gripbench.bench.papers.claims import load_paper
+from gripbench.bench.papers.yoon2015 import reproduction as yoon2015
+from gripbench.bench.papers.yoon2015.reproduction import friction_error_and_delay
 from gripbench.envs.vehicles import GRAVITY
 
 

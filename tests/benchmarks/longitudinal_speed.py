@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from gripbench.envs.longitudinal import TRUTH_TYPE
-from gripbench.envs.longitudinal_plant import (
+from gripbench.envs.drivers.profiles import breakpoints, profile_value, segment_records
+from gripbench.envs.plants.longitudinal.plant import (
     INPUT_TYPE,
     TYRE_TYPE,
     derivatives,
@@ -17,7 +17,7 @@ from gripbench.envs.longitudinal_plant import (
     jacobian,
     plant_record,
 )
-from gripbench.envs.profiles import breakpoints, profile_value, segment_records
+from gripbench.envs.plants.longitudinal.world import TRUTH_TYPE
 from gripbench.envs.vehicles import GRAVITY, load_vehicle
 from gripbench.envs.worlds import load_scenario, record, simulation_of
 from gripbench.methods.extended_kalman_filter import ExtendedKalmanFilter

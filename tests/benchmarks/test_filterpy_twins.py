@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from filterpy.kalman import KalmanFilter
 
-from gripbench.methods.kalman import correct_scalar, filter_type, predict
+from gripbench.methods.blocks.kalman import correct_scalar, filter_type, predict
 
 STEPS = 2000
 SIZES = (2, 3, 4, 5)

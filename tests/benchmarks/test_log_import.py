@@ -6,9 +6,9 @@ import pyarrow.csv
 import pyarrow.parquet
 import pytest
 
-from gripbench.envs.logs.channel_map import ChannelMap
-from gripbench.envs.logs.importing import import_log
 from gripbench.envs.signals import SIGNALS
+from gripbench.logs.channel_map import ChannelMap
+from gripbench.logs.importing import import_log
 from gripbench.methods.kinematic_kalman_filter import KinematicKalmanFilter
 
 CHANNELS = [

@@ -9,9 +9,9 @@ import functools
 import numpy as np
 import pytest
 
-from gripbench.bench.execution import missing
-from gripbench.bench.registry import built_in_methods, choose_method
-from gripbench.bench.timings import FORM, LABEL, STEPS
+from gripbench.bench.catalogue.registry import built_in_methods, choose_method
+from gripbench.bench.publishing.timings import FORM, LABEL, STEPS
+from gripbench.bench.running.execution import missing
 from gripbench.envs.recordings import select_channels
 from gripbench.envs.worlds import load_scenario, record, scenario_files
 

@@ -4,7 +4,7 @@ import numba
 import numpy as np
 import pytest
 
-from gripbench.envs import planar_plant as plant
+from gripbench.envs.plants.planar import plant
 from gripbench.envs.vehicles import load_vehicle
 from gripbench.envs.worlds import load_scenario, simulation_of
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from gripbench.bench.timings import STEPS, reference_kernel
+from gripbench.bench.publishing.timings import STEPS, reference_kernel
 
 CALL = 100_000
 

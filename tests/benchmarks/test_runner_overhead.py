@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from gripbench.bench import runner
-from gripbench.bench.api import plan_of
-from gripbench.bench.backends import Backend
-from gripbench.bench.cells import run_tasks
-from gripbench.bench.runner import run_plan
-from gripbench.bench.store import Store
+from gripbench.bench.running import runner
+from gripbench.bench.running.api import plan_of
+from gripbench.bench.running.backends import Backend
+from gripbench.bench.running.cells import run_tasks
+from gripbench.bench.running.runner import run_plan
+from gripbench.bench.running.store import Store
 
 SEEDS = int(os.environ.get("GRIPBENCH_SEEDS", "1"))
 

@@ -3,7 +3,7 @@
 import pytest
 
 import gripbench
-from gripbench.bench.report.page import write_report
+from gripbench.bench.publishing.report.page import write_report
 
 pytestmark = pytest.mark.browser
 

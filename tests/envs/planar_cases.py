@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from gripbench.configuration import CONFIGS, parse, read_toml
-from gripbench.envs.planar import PlanarScenario, PlanarSimulation
+from gripbench.envs.plants.planar.world import PlanarScenario, PlanarSimulation
 from gripbench.envs.vehicles import Vehicle, load_vehicle
 
 SCENARIOS = sorted(

@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import expm
 
 from gripbench.configuration import CONFIGS, parse, read_toml
-from gripbench.envs.bicycle import BicycleScenario, BicycleSimulation, steady_state
+from gripbench.envs.plants.bicycle import BicycleScenario, BicycleSimulation, steady_state
 from gripbench.envs.vehicles import load_vehicle
 from gripbench.envs.worlds import load_scenario, record
 from gripbench.errors import InputError

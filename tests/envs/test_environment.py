@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from gripbench.envs.environment import VehicleEnvironment
+from gripbench.envs.gym.environment import VehicleEnvironment
 from gripbench.envs.worlds import load_scenario, record, scenario_files, simulation_of
 from gripbench.errors import InputError
 

@@ -7,8 +7,9 @@ import pytest
 from longitudinal_drive import ACCURATE, clean
 from scipy.integrate import solve_ivp
 
-from gripbench.envs import longitudinal_integrators as integrators
-from gripbench.envs.longitudinal_plant import (
+from gripbench.envs.drivers.profiles import breakpoints, profile_value, segment_records
+from gripbench.envs.plants.longitudinal import integrators
+from gripbench.envs.plants.longitudinal.plant import (
     INPUT_TYPE,
     TYRE_TYPE,
     derivatives,
@@ -16,7 +17,6 @@ from gripbench.envs.longitudinal_plant import (
     jacobian,
     plant_record,
 )
-from gripbench.envs.profiles import breakpoints, profile_value, segment_records
 from gripbench.envs.vehicles import load_vehicle
 from gripbench.envs.worlds import record
 

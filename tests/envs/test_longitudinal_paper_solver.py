@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from longitudinal_drive import clean, custom
 
-from gripbench.envs import longitudinal_paper_solver as solver
-from gripbench.envs.longitudinal import LongitudinalSimulation
+from gripbench.envs.plants.longitudinal import paper_solver as solver
+from gripbench.envs.plants.longitudinal.world import LongitudinalSimulation
 from gripbench.envs.vehicles import load_vehicle
 from gripbench.envs.worlds import load_scenario, record
 from gripbench.errors import GripbenchError
@@ -133,7 +133,7 @@ def test_a_tight_tolerance_removes_the_ringing(monkeypatch):
     assert loose.mean() < -30.0
     assert loose.std() > 10.0
     monkeypatch.setattr(solver, "TOLERANCE", 1e-7)
-    monkeypatch.setattr("gripbench.envs.longitudinal.paper_solver", uncompiled)
+    monkeypatch.setattr("gripbench.envs.plants.longitudinal.world.paper_solver", uncompiled)
     tight = front_force_error()
     assert abs(tight.mean()) < 0.1
     assert tight.std() < 0.5

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from longitudinal_drive import GRAVITY, clean, custom, printed_derivatives
 
-from gripbench.envs.longitudinal_plant import (
+from gripbench.envs.plants.longitudinal.plant import (
     HOLD_SPEED,
     INPUT_TYPE,
     PLANT_PARAMETERS,

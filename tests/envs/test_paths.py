@@ -4,8 +4,15 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from gripbench.envs.paths import DoubleLaneChange, PublicRoad, Segment, Slalom, Turns, lay_path
-from gripbench.envs.road import SPACING
+from gripbench.envs.roads.paths import (
+    DoubleLaneChange,
+    PublicRoad,
+    Segment,
+    Slalom,
+    Turns,
+    lay_path,
+)
+from gripbench.envs.roads.road import SPACING
 
 PATHS = [
     DoubleLaneChange(kind="double_lane_change"),

@@ -7,10 +7,10 @@ import pytest
 from planar_cases import OPEN_LOOP, SCENARIOS, held, scenario_of, simulation_of, vehicle_with
 from scipy.integrate import solve_ivp
 
-from gripbench.envs import planar_plant as plant
-from gripbench.envs.bicycle import steady_state
-from gripbench.envs.planar import PlanarSimulation
-from gripbench.envs.road import feel_road
+from gripbench.envs.plants.bicycle import steady_state
+from gripbench.envs.plants.planar import plant
+from gripbench.envs.plants.planar.world import PlanarSimulation
+from gripbench.envs.roads.road import feel_road
 from gripbench.envs.vehicles import load_vehicle
 
 # --- the right-hand side, written a second time with vectors and matrices

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gripbench.configuration import parse
-from gripbench.envs.profiles import Segment, breakpoints, profile_value, segment_records
+from gripbench.envs.drivers.profiles import Segment, breakpoints, profile_value, segment_records
 from gripbench.errors import InputError
 
 RAMP = Segment(start=1.0, end=3.0, first=10.0, last=50.0)

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from gripbench.envs.path_drivers import (
+from gripbench.envs.drivers.path_drivers import (
     SineSteer,
     SineThenSquareSteer,
     SquareSteer,
@@ -11,7 +11,7 @@ from gripbench.envs.path_drivers import (
     steering_angles,
     wrapped,
 )
-from gripbench.envs.road import SPACING, MagneticField, Road, disturb_field, lay_road
+from gripbench.envs.roads.road import SPACING, MagneticField, Road, disturb_field, lay_road
 
 NO_PATH = np.zeros(0)
 

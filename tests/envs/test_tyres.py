@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gripbench.envs.tyres import (
+from gripbench.envs.tyres.longitudinal import (
     CRAWL_SPEED,
     magic_formula,
     magic_formula_slope,

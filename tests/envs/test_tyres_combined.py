@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gripbench.envs.tyres_combined import (
+from gripbench.envs.tyres.combined import (
     BRUSH,
     DUGOFF,
     MAGIC_FORMULA,

@@ -6,7 +6,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gripbench.methods.course_history import HISTORY, change_since, is_usable, remember, wrapped
+from gripbench.methods.blocks.course_history import (
+    HISTORY,
+    change_since,
+    is_usable,
+    remember,
+    wrapped,
+)
 
 
 @given(st.floats(-50.0, 50.0))

@@ -7,7 +7,7 @@ from filterpy.kalman import KalmanFilter
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gripbench.methods import kalman
+from gripbench.methods.blocks import kalman
 
 
 @numba.njit

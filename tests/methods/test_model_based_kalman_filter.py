@@ -9,9 +9,9 @@ from hypothesis.extra.numpy import arrays
 from scipy.linalg import expm
 from single_track_drive import BLAZER, STEP, drive, turn
 
-from gripbench.bench.consistency import chi_square_test, normalised_squares, whiteness_test
-from gripbench.bench.riccati import poles
-from gripbench.methods.discretisation import exponential
+from gripbench.bench.papers.anderson2004.riccati import poles
+from gripbench.bench.scoring.consistency import chi_square_test, normalised_squares, whiteness_test
+from gripbench.methods.blocks.discretisation import exponential
 from gripbench.methods.model_based_kalman_filter import ModelBasedKalmanFilter
 from gripbench.methods.stiffness_update import StiffnessUpdate
 

@@ -14,8 +14,8 @@ from longitudinal_samples import (
     weighted_least_squares,
 )
 
+from gripbench.methods.blocks.rls import forgetting_factor, rls
 from gripbench.methods.individual_wheel_acceleration import IndividualWheelAcceleration
-from gripbench.methods.rls import forgetting_factor, rls
 from gripbench.methods.slip_slope import SlipSlope
 
 

@@ -8,7 +8,7 @@ import pytest
 from filterpy.kalman import KalmanFilter
 from scipy.spatial.transform import Rotation
 
-from gripbench.methods.kalman import filter_type
+from gripbench.methods.blocks.kalman import filter_type
 from gripbench.methods.sideslip_kalman_filter import (
     IGNORE_DELAY,
     LARSEN,

@@ -37,8 +37,8 @@ def list_kind(kind: Annotated[Kind, typer.Argument(help="What to list.")]) -> No
     """List scenarios, methods, vehicles, signals or suites."""
     from rich.table import Table
 
-    from gripbench.bench.catalogue import listing
-    from gripbench.bench.presentation import console
+    from gripbench.bench.catalogue.listing import listing
+    from gripbench.bench.publishing.presentation import console
 
     header, lines = listing(kind.value)
     table = Table(*header)
@@ -51,8 +51,8 @@ def show(
     name: Annotated[str, typer.Argument(help="A scenario, method, vehicle, suite...")],
 ) -> None:
     """Show the full settings of whatever has this name, as JSON."""
-    from gripbench.bench.catalogue import settings
-    from gripbench.bench.presentation import console
+    from gripbench.bench.catalogue.listing import settings
+    from gripbench.bench.publishing.presentation import console
 
     console().print_json(json.dumps(settings(name)))
 
@@ -66,9 +66,9 @@ def methods_table(
     """Print which sensors each method needs: Table I of Li, Du & Li (2014), from the code."""
     from rich.table import Table
 
-    from gripbench.bench.catalogue import sensor_needs
-    from gripbench.bench.presentation import console
-    from gripbench.bench.summary import FOOTNOTE, MARK
+    from gripbench.bench.catalogue.listing import sensor_needs
+    from gripbench.bench.publishing.presentation import console
+    from gripbench.bench.ranking.summary import FOOTNOTE, MARK
 
     header, lines = sensor_needs(target, everything)
     table = Table(*header)

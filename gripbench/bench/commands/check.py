@@ -33,8 +33,8 @@ def check(
     """Check a method against everything that the benchmark expects of one."""
     from rich.table import Table
 
-    from gripbench.bench.check import check_estimator, failures
-    from gripbench.bench.presentation import console
+    from gripbench.bench.catalogue.check import check_estimator, failures
+    from gripbench.bench.publishing.presentation import console
 
     results = check_estimator(method, scenario or (), checks=only or ())
     table = Table("check", "result")
@@ -55,8 +55,8 @@ def new_method(
     ] = False,
 ) -> None:
     """Write a small working method with its test."""
-    from gripbench.bench.presentation import console
-    from gripbench.bench.templates import write_method
+    from gripbench.bench.catalogue.templates import write_method
+    from gripbench.bench.publishing.presentation import console
 
     method, test = write_method(name, folder, compiled)
     class_name = "".join(part.capitalize() for part in name.split("_"))

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from gripbench.bench.store import DEFAULT_RESULTS
+from gripbench.bench.running.store import DEFAULT_RESULTS
 
 
 def register(app: typer.Typer) -> None:
@@ -24,8 +24,8 @@ def figures(
     dpi: Annotated[int, typer.Option(min=30, max=1200, help="Dots an inch of the PNG.")] = 150,
 ) -> None:
     """Draw a paper's result figures by number, as PNG and PDF, into RESULTS/PAPER/figures."""
-    from gripbench.bench.figures.catalogue import choose, write_figures
-    from gripbench.bench.presentation import progress
+    from gripbench.bench.papers.figures import choose, write_figures
+    from gripbench.bench.publishing.presentation import progress
 
     wanted = figure or []
     directory = results / paper / "figures"

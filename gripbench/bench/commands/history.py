@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gripbench.bench.store import DEFAULT_RESULTS
+from gripbench.bench.running.store import DEFAULT_RESULTS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -39,8 +39,8 @@ def add(
     time: Annotated[str, typer.Option(help="Its time, ISO 8601; goes with --commit.")] = "",
 ) -> None:
     """Add the leaderboard to the history; a commit that is there already is replaced."""
-    from gripbench.bench import history
-    from gripbench.bench.leaderboard import read
+    from gripbench.bench.publishing import history
+    from gripbench.bench.publishing.leaderboard import read
     from gripbench.errors import InputError
 
     if bool(commit) != bool(time):
@@ -61,7 +61,7 @@ def show(
     ] = "terminal",
 ) -> None:
     """Print the history as a table."""
-    from gripbench.bench import history, tables
+    from gripbench.bench.publishing import history, tables
 
     tables.show(history.table_of(_frame(results, target, method)), format_)
 
@@ -73,7 +73,7 @@ def plot(
     method: Annotated[str, typer.Option(help="Only this method; all by default.")] = "",
 ) -> None:
     """Draw RMS and relative runtime by commit."""
-    from gripbench.bench import history
+    from gripbench.bench.publishing import history
     from gripbench.errors import InputError, nearest
 
     suffixes = (".png", ".pdf", ".svg")
@@ -89,7 +89,7 @@ def plot(
 
 
 def _frame(results: Path, target: str, method: str) -> pd.DataFrame:
-    from gripbench.bench import history
+    from gripbench.bench.publishing import history
     from gripbench.errors import unknown
 
     frame = history.frame_of(history.read_rows(results / history.FILE))

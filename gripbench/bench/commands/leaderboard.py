@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from gripbench.bench.store import DEFAULT_RESULTS
+from gripbench.bench.running.store import DEFAULT_RESULTS
 
 
 def register(app: typer.Typer) -> None:
@@ -48,13 +48,13 @@ def leaderboard(
     ] = None,
 ) -> None:
     """Build the leaderboard of stored rows; with --compare, fail if a method became worse."""
-    from gripbench.bench.leaderboard import build, read, usual_targets, write
-    from gripbench.bench.registry import find_scenario, load_suite
-    from gripbench.bench.regressions import changes_table
-    from gripbench.bench.regressions import compare as compare_leaderboards
-    from gripbench.bench.store import read_rows, write_atomically
-    from gripbench.bench.tables import format_of, render, show
-    from gripbench.bench.timings import read_timings
+    from gripbench.bench.catalogue.registry import find_scenario, load_suite
+    from gripbench.bench.publishing.leaderboard import build, read, usual_targets, write
+    from gripbench.bench.publishing.regressions import changes_table
+    from gripbench.bench.publishing.regressions import compare as compare_leaderboards
+    from gripbench.bench.publishing.tables import format_of, render, show
+    from gripbench.bench.publishing.timings import read_timings
+    from gripbench.bench.running.store import read_rows, write_atomically
     from gripbench.errors import InputError, unknown
 
     base = read(compare) if compare is not None else None  # before --out may replace it

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from gripbench.bench.recorded import RecordedScore
-    from gripbench.bench.tables import Table
+    from gripbench.bench.publishing.tables import Table
+    from gripbench.bench.running.recorded import RecordedScore
 
 
 def register(app: typer.Typer) -> None:
@@ -39,10 +39,10 @@ def import_(
     ] = Path("recordings"),
 ) -> None:
     """Import a log of a real vehicle as a recording, and report its quality."""
-    from gripbench.envs.logs.channel_map import load_channel_map
-    from gripbench.envs.logs.importing import import_log
-    from gripbench.envs.logs.storing import store
     from gripbench.errors import InputError
+    from gripbench.logs.channel_map import load_channel_map
+    from gripbench.logs.importing import import_log
+    from gripbench.logs.storing import store
 
     if inspect:
         _print_inspection(log, database)
@@ -69,7 +69,7 @@ def path(
     ] = None,
 ) -> None:
     """Print where the files of published recordings are looked for."""
-    from gripbench.envs.logs.locations import VARIABLE, data_folder
+    from gripbench.logs.locations import VARIABLE, data_folder
 
     chosen = data_folder(folder)
     print(chosen)
@@ -105,10 +105,10 @@ def recordings(
     ] = "terminal",
 ) -> None:
     """Score methods and trivial estimators on recordings of real vehicles."""
-    from gripbench.bench.figures.recordings import PICTURES, write_pictures
-    from gripbench.bench.recorded import score_published
-    from gripbench.bench.tables import show
-    from gripbench.envs.logs.published import recording_files
+    from gripbench.bench.publishing.figures.recordings import PICTURES, write_pictures
+    from gripbench.bench.publishing.tables import show
+    from gripbench.bench.running.recorded import score_published
+    from gripbench.logs.published import recording_files
 
     scores = score_published(names or recording_files(), method or (), data, by_excitation)
     scored = [score for score in scores if score.status == "ok"]
@@ -133,7 +133,7 @@ def tune(
     ] = None,
 ) -> None:
     """Tune a method's noise levels on the training windows of a recording."""
-    from gripbench.bench.tuning import settings_text, tune_published
+    from gripbench.bench.running.tuning import settings_text, tune_published
 
     tuned = tune_published(recording, method, target, draws, data)
     print(
@@ -160,18 +160,18 @@ def identify(
     ] = None,
 ) -> None:
     """Identify tyres, or without a velocity reference the steering, and sensor biases."""
-    from gripbench.envs.logs.biases import identify_biases
-    from gripbench.envs.logs.channel_map import load_channel_map
-    from gripbench.envs.logs.identification import (
+    from gripbench.envs.signals import signal
+    from gripbench.envs.vehicles import load_vehicle
+    from gripbench.errors import InputError
+    from gripbench.logs.biases import identify_biases
+    from gripbench.logs.channel_map import load_channel_map
+    from gripbench.logs.identification import (
         identified_vehicle,
         identify_steering,
         identify_tyres,
         write_vehicle,
     )
-    from gripbench.envs.logs.published import load_recording, recording_files
-    from gripbench.envs.signals import signal
-    from gripbench.envs.vehicles import load_vehicle
-    from gripbench.errors import InputError
+    from gripbench.logs.published import load_recording, recording_files
 
     imported = load_recording(recording, data)
     runs = imported.recordings
@@ -204,7 +204,7 @@ def identify(
 
 
 def _table(scores: list[RecordedScore]) -> Table:
-    from gripbench.bench.tables import Column, Table
+    from gripbench.bench.publishing.tables import Column, Table
 
     rows = [
         {
@@ -243,7 +243,7 @@ def _print_inspection(log: Path, database: str) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from gripbench.envs.logs.inspection import inspect_log
+    from gripbench.logs.inspection import inspect_log
 
     inspection = inspect_log(log, database)
     table = Table("column", "unit", "samples", "blank", "lowest", "highest")

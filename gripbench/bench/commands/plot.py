@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from gripbench.bench.store import DEFAULT_RESULTS
+from gripbench.bench.running.store import DEFAULT_RESULTS
 
 
 def register(app: typer.Typer) -> None:
@@ -35,9 +35,9 @@ def plot(
     dpi: Annotated[int, typer.Option(min=30, max=1200, help="Dots an inch of the PNG.")] = 150,
 ) -> None:
     """Draw a signal of one run, truth against estimates and their errors, as PNG and PDF."""
-    from gripbench.bench.figures.run_plot import run_plot
-    from gripbench.bench.figures.runs import Runs
-    from gripbench.bench.figures.style import save, style
+    from gripbench.bench.publishing.figures.run_plot import run_plot
+    from gripbench.bench.publishing.figures.runs import Runs
+    from gripbench.bench.publishing.figures.style import save, style
 
     chosen = split_methods(methods)
     if output is None:

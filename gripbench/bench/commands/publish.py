@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from gripbench.bench.store import DEFAULT_RESULTS
+from gripbench.bench.running.store import DEFAULT_RESULTS
 
 SEEDS = 20
 """Seeds of a published suite."""
@@ -41,17 +41,17 @@ def publish(
     """
     import joblib
 
-    from gripbench.bench.api import limits_of, plan_of
-    from gripbench.bench.backends import Backend
-    from gripbench.bench.claims import paper_files
-    from gripbench.bench.leaderboard import build, write
-    from gripbench.bench.manifest import manifest, write_manifest
-    from gripbench.bench.registry import load_suite, suite_files
-    from gripbench.bench.report.content import chosen_targets, rows_of_suites
-    from gripbench.bench.report.page import write_report
-    from gripbench.bench.runner import run_plan
-    from gripbench.bench.statistics import CONFIDENCE
-    from gripbench.bench.store import Store, read_rows
+    from gripbench.bench.catalogue.registry import load_suite, suite_files
+    from gripbench.bench.papers.claims import paper_files
+    from gripbench.bench.publishing.leaderboard import build, write
+    from gripbench.bench.publishing.manifest import manifest, write_manifest
+    from gripbench.bench.publishing.report.content import chosen_targets, rows_of_suites
+    from gripbench.bench.publishing.report.page import write_report
+    from gripbench.bench.ranking.statistics import CONFIDENCE
+    from gripbench.bench.running.api import limits_of, plan_of
+    from gripbench.bench.running.backends import Backend
+    from gripbench.bench.running.runner import run_plan
+    from gripbench.bench.running.store import Store, read_rows
     from gripbench.errors import unknown
 
     suites = suite or list(suite_files())
@@ -107,7 +107,7 @@ def publish_paper(name: str, results: Path, figures: bool = True) -> tuple[str, 
     The paper's name, and a line for each figure that has left the tolerance stored beside it.
     """
     from gripbench.bench.commands.reproduce import reproduce
-    from gripbench.bench.figures.catalogue import write_figures
+    from gripbench.bench.papers.figures import write_figures
 
     said = io.StringIO()
     with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from gripbench.bench.store import DEFAULT_RESULTS
+from gripbench.bench.running.store import DEFAULT_RESULTS
 
 
 def register(app: typer.Typer) -> None:
@@ -45,11 +45,11 @@ def rank(
     wins: Annotated[bool, typer.Option("--wins", help="Also who wins against whom.")] = False,
 ) -> None:
     """Rank the methods of stored rows with the confidence that their runs allow."""
-    from gripbench.bench.board_tables import board_table, wins_table
-    from gripbench.bench.leaderboard import usual_targets
-    from gripbench.bench.ranking import boards
-    from gripbench.bench.store import read_rows
-    from gripbench.bench.tables import show
+    from gripbench.bench.publishing.board_tables import board_table, wins_table
+    from gripbench.bench.publishing.leaderboard import usual_targets
+    from gripbench.bench.publishing.tables import show
+    from gripbench.bench.ranking.ranking import boards
+    from gripbench.bench.running.store import read_rows
     from gripbench.errors import InputError
 
     rows = read_rows(results, tuple(scenario or ()))

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from gripbench.bench.store import DEFAULT_RESULTS
+from gripbench.bench.running.store import DEFAULT_RESULTS
 
 
 def register(app: typer.Typer) -> None:
@@ -32,9 +32,9 @@ def report(
     ] = None,
 ) -> None:
     """Write a self-contained HTML report of the stored results; it opens from disk, offline."""
-    from gripbench.bench.backends import Backend
-    from gripbench.bench.presentation import progress
-    from gripbench.bench.report.page import write_report
+    from gripbench.bench.publishing.presentation import progress
+    from gripbench.bench.publishing.report.page import write_report
+    from gripbench.bench.running.backends import Backend
 
     path = output or results / "report.html"
     with progress("time series", 1) as bar:

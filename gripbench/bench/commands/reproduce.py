@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from gripbench.bench.store import DEFAULT_RESULTS
+from gripbench.bench.running.store import DEFAULT_RESULTS
 
 
 def register(app: typer.Typer) -> None:
@@ -23,7 +23,7 @@ def reproduce(
 
     Exit code 1 when a figure has left the tolerance that is stored beside it.
     """
-    from gripbench.bench.paper_comparison import reproduce_paper
+    from gripbench.bench.papers.comparison import reproduce_paper
 
     directory = results / paper
     changed = reproduce_paper(paper, directory)

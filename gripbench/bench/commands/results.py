@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from gripbench.bench.store import DEFAULT_RESULTS
+from gripbench.bench.running.store import DEFAULT_RESULTS
 
 Results = Annotated[Path, typer.Option(help="Folder of the stored rows.")]
 Scenarios = Annotated[list[str] | None, typer.Option(help="Only this scenario; repeat for more.")]
@@ -27,8 +27,8 @@ def list_rows(results: Results = DEFAULT_RESULTS) -> None:
     """List the stored rows by scenario and method."""
     from rich.table import Table
 
-    from gripbench.bench.presentation import console
-    from gripbench.bench.store import read_rows
+    from gripbench.bench.publishing.presentation import console
+    from gripbench.bench.running.store import read_rows
 
     frame = read_rows(results).drop_duplicates(["scenario", "label", "seed"])
     if frame.empty:
@@ -51,9 +51,9 @@ def show(
     results: Results = DEFAULT_RESULTS, scenario: Scenarios = None, method: Methods = None
 ) -> None:
     """Show the RMS errors of stored rows, and what failed."""
-    from gripbench.bench.presentation import console, print_failures, print_summary
-    from gripbench.bench.store import read_rows
-    from gripbench.bench.summary import summary
+    from gripbench.bench.publishing.presentation import console, print_failures, print_summary
+    from gripbench.bench.ranking.summary import summary
+    from gripbench.bench.running.store import read_rows
 
     frame = read_rows(results, tuple(scenario or ()), tuple(method or ()))
     if frame.empty:
@@ -70,8 +70,8 @@ def prune(
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would go.")] = False,
 ) -> None:
     """Remove the rows of a scenario or method, or what is damaged or of unknown scenarios."""
-    from gripbench.bench.presentation import console
-    from gripbench.bench.pruning import remove, stale, stored
+    from gripbench.bench.publishing.presentation import console
+    from gripbench.bench.running.pruning import remove, stale, stored
 
     if scenario or method:
         paths = stored(results, tuple(scenario or ()), tuple(method or ()))

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from gripbench.bench.store import DEFAULT_RESULTS
+from gripbench.bench.running.store import DEFAULT_RESULTS
 
 
 def register(app: typer.Typer) -> None:
@@ -57,15 +57,20 @@ def run(
     ] = None,
 ) -> None:
     """Run methods on scenarios and print their RMS errors; what is stored is not run again."""
-    from gripbench.bench.api import limits_of, order_in, plan_of
-    from gripbench.bench.backends import Backend
-    from gripbench.bench.presentation import console, print_failures, print_summary, progress
-    from gripbench.bench.recorded_scenarios import PREFIX
-    from gripbench.bench.registry import load_suite
-    from gripbench.bench.rows import Row, frame_of
-    from gripbench.bench.runner import run_plan
-    from gripbench.bench.store import Store, write_atomically
-    from gripbench.bench.summary import scores_csv, summary
+    from gripbench.bench.catalogue.registry import load_suite
+    from gripbench.bench.publishing.presentation import (
+        console,
+        print_failures,
+        print_summary,
+        progress,
+    )
+    from gripbench.bench.ranking.summary import scores_csv, summary
+    from gripbench.bench.running.api import limits_of, order_in, plan_of
+    from gripbench.bench.running.backends import Backend
+    from gripbench.bench.running.recorded_scenarios import PREFIX
+    from gripbench.bench.running.rows import Row, frame_of
+    from gripbench.bench.running.runner import run_plan
+    from gripbench.bench.running.store import Store, write_atomically
 
     chosen = [*(scenario or []), *(f"{PREFIX}{place}" for place in recording or [])]
     plan = plan_of(suite, chosen, method or [], seeds or None)

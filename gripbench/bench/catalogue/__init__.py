@@ -1,0 +1,1 @@
+"""What there is: the registry, what a method declares, its checks, the templates of new files."""

@@ -1,0 +1,193 @@
+"""What there is, as lines of text and as plain data; nothing here runs anything."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from gripbench.bench.catalogue.registry import (
+    all_scenario_files,
+    built_in_methods,
+    choose_method,
+    find_scenario,
+    load_suite,
+    method_names,
+    suite_files,
+)
+from gripbench.bench.ranking.summary import MARK, marked
+from gripbench.bench.running.recorded_scenarios import PREFIX
+from gripbench.envs.signals import SIGNALS, signal
+from gripbench.envs.vehicles import VEHICLE_PARAMETERS, load_vehicle, vehicle_files
+from gripbench.errors import InputError, unknown
+from gripbench.methods.contract import CompiledMethod
+
+Lines = list[tuple[str, ...]]
+
+
+def listing(kind: str) -> tuple[tuple[str, ...], Lines]:
+    """Return header and lines of a list of `scenarios`, `methods`, `vehicles`..."""
+    return _LISTS[kind]()
+
+
+def settings(name: str) -> dict[str, Any]:
+    """Return everything that is set for the scenario, method, vehicle, suite or signal `name`.
+
+    Raises
+    ------
+    InputError
+        If nothing has this name; the message names the nearest one.
+    """
+    if name in all_scenario_files() or name.endswith(".toml") or name.startswith(PREFIX):
+        scenario = find_scenario(name)
+        sensors = {key: item.model_dump() for key, item in scenario.all_sensors().items()}
+        return {"kind": "scenario", **scenario.model_dump(mode="json"), "sensors": sensors}
+    if name in suite_files():
+        return {"kind": "suite", **load_suite(name).model_dump(mode="json")}
+    if name in vehicle_files():
+        return {"kind": "vehicle", **_vehicle(name)}
+    if name in SIGNALS:
+        return {"kind": "signal", **vars(signal(name))}
+    if ".py" in name or name.partition(":")[0].partition("@")[0] in method_names():
+        return {"kind": "method", **_method(name)}
+    known = [*all_scenario_files(), *method_names(), *suite_files(), *vehicle_files(), *SIGNALS]
+    raise unknown("name", name, known)
+
+
+def sensor_needs(target: str = "", everything: bool = False) -> tuple[tuple[str, ...], Lines]:
+    """Return the methods against the instruments that they need.
+
+    Parameters
+    ----------
+    target
+        Only methods that estimate this signal; empty: any.
+    everything
+        All methods, or those of Li, Du & Li (2014), whose Table I this is.
+    """
+    methods = {
+        marked(label, _idealised(method)): method
+        for label, method in _with_sensor_variants()
+        if (everything or "Li, Du" in method.reference)
+        and (not target or target in method.estimates)
+    }
+    if not methods:
+        raise InputError(f"no method estimates '{target}'")
+    instruments = [
+        name
+        for name in dict.fromkeys(item.instrument for item in SIGNALS.values())
+        if any(name in _instruments(method) for method in methods.values())
+    ]
+    names = [name + MARK if name == "idealised" else name for name in instruments]
+    lines = [
+        (label, *("x" if name in _instruments(method) else "" for name in instruments),
+         ", ".join(method.estimates))
+        for label, method in methods.items()
+    ]  # fmt: skip
+    return ("method", *names, "estimates"), lines
+
+
+def _with_sensor_variants() -> list[tuple[str, CompiledMethod]]:
+    """Return the built-in methods, also in the variants that read other channels."""
+    found = []
+    for name, method in built_in_methods().items():
+        found.append((name, method()))
+        found += [(f"{name}:{variant}", method(variant)) for variant in method.sensors_of]
+    return found
+
+
+def _idealised(method: CompiledMethod) -> tuple[str, ...]:
+    return tuple(name for name in method.sensors if signal(name).idealised)
+
+
+def _instruments(method: CompiledMethod) -> set[str]:
+    return {signal(name).instrument for name in method.sensors}
+
+
+def _method(name: str) -> dict[str, Any]:
+    spec = choose_method(name)
+    declaration = spec.declaration
+    content: dict[str, Any] = {
+        "name": declaration.name,
+        "title": declaration.title,
+        "reference": declaration.reference,
+        "variant": declaration.variant,
+        "sensors": list(declaration.sensors),
+        "idealised": list(declaration.idealised),
+        "estimates": list(declaration.estimates),
+        "variances": list(declaration.variances),
+        "vehicle_parameters": list(declaration.vehicle_parameters),
+        "settings": declaration.settings,
+    }
+    built_in = built_in_methods().get(declaration.name)
+    if built_in is not None:
+        content["parameters"] = {
+            item.name: {
+                "default": item.default,
+                "unit": item.unit,
+                "low": item.low if abs(item.low) != float("inf") else None,
+                "high": item.high if abs(item.high) != float("inf") else None,
+                "description": item.description,
+            }
+            for item in built_in.parameters
+        }
+        content["variants"] = {key: dict(value) for key, value in built_in.variants.items()}
+    return content
+
+
+def _vehicle(name: str) -> dict[str, Any]:
+    vehicle = load_vehicle(name)
+    parameters = {
+        key: {**item.model_dump(), "unit": VEHICLE_PARAMETERS[key].unit}
+        for key, item in vehicle.parameters.items()
+    }
+    return {"name": vehicle.name, "description": vehicle.description, "parameters": parameters}
+
+
+def _scenario_lines() -> tuple[tuple[str, ...], Lines]:
+    lines: Lines = []
+    for name in all_scenario_files():
+        item = find_scenario(name)
+        lines.append((name, item.world, item.vehicle, f"{item.horizon:g} s", item.description))
+    return ("scenario", "world", "vehicle", "horizon", "description"), lines
+
+
+def _method_lines() -> tuple[tuple[str, ...], Lines]:
+    lines: Lines = []
+    for name, origin in method_names().items():
+        method = built_in_methods().get(name)
+        if method is None:
+            lines.append((name, origin, "", "", ""))
+            continue
+        title = marked(method.title, _idealised(method()))
+        variants = ", ".join(method.variants)
+        lines.append((name, title, ", ".join(method.estimates), variants, method.reference))
+    return ("method", "title", "estimates", "variants", "reference"), lines
+
+
+def _vehicle_lines() -> tuple[tuple[str, ...], Lines]:
+    return ("vehicle", "description"), [
+        (name, load_vehicle(name).description) for name in vehicle_files()
+    ]
+
+
+def _signal_lines() -> tuple[tuple[str, ...], Lines]:
+    return ("signal", "unit", "axes", "positive", "instrument", "description"), [
+        (item.name, item.unit, item.frame, item.sign, item.instrument, item.description)
+        for item in SIGNALS.values()
+    ]
+
+
+def _suite_lines() -> tuple[tuple[str, ...], Lines]:
+    lines: Lines = []
+    for name in suite_files():
+        suite = load_suite(name)
+        size = f"{len(suite.scenarios)} x {len(suite.methods)} x {suite.seeds}"
+        lines.append((name, size, suite.description))
+    return ("suite", "scenarios x methods x seeds", "description"), lines
+
+
+_LISTS = {
+    "scenarios": _scenario_lines,
+    "methods": _method_lines,
+    "vehicles": _vehicle_lines,
+    "signals": _signal_lines,
+    "suites": _suite_lines,
+}

@@ -1,0 +1,363 @@
+"""Where methods, scenarios and suites come from.
+
+A method is known by name (built in, registered by decorator, or an entry point of the group
+`gripbench.methods`) or by file (`path/to/file.py:Class`). A scenario is known by name (built in,
+or an entry point of the group `gripbench.scenarios` that gives the path of a TOML file or a
+folder of them) or by the path of a TOML file. A suite is a TOML file that names both.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import importlib.metadata
+import inspect
+import pkgutil
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
+
+import cloudpickle  # type: ignore[import-untyped]
+from pydantic import Field
+
+from gripbench import methods as built_in
+from gripbench.bench.catalogue.declarations import Declaration, Source, declaration_of
+from gripbench.configuration import CONFIGS, Configuration, parse, read_toml
+from gripbench.envs.scenarios import Scenario
+from gripbench.envs.worlds import load_scenario, scenario_files
+from gripbench.errors import InputError, unknown
+from gripbench.methods.contract import CompiledMethod
+from gripbench.sources import digest, source_digest
+
+METHOD_GROUP = "gripbench.methods"
+SCENARIO_GROUP = "gripbench.scenarios"
+
+_registered: dict[str, Any] = {}
+
+Class = TypeVar("Class", bound=type)
+
+
+def register(method: Class) -> Class:
+    """Make a class known by its `name`; a class decorator.
+
+    Raises
+    ------
+    InputError
+        If a built-in method has the name, or it is none.
+    """
+    name = getattr(method, "name", None)
+    if not isinstance(name, str):
+        raise InputError(f"{method.__name__}: set the class attribute 'name' before registering")
+    if name in built_in_methods():
+        raise InputError(f"{method.__name__}: the name '{name}' is that of a built-in method")
+    _registered[name] = method
+    return method
+
+
+@functools.cache
+def built_in_methods() -> Mapping[str, type[CompiledMethod]]:
+    """Return the methods that ship with gripbench, by name."""
+    found: dict[str, type[CompiledMethod]] = {}
+    for module in pkgutil.walk_packages(built_in.__path__, built_in.__name__ + "."):
+        for item in vars(importlib.import_module(module.name)).values():
+            if (
+                inspect.isclass(item)
+                and issubclass(item, CompiledMethod)
+                and item.__module__ == module.name
+                and isinstance(getattr(item, "name", None), str)
+                and not item.__name__.startswith("_")
+            ):
+                found[item.name] = item
+    return dict(sorted(found.items()))
+
+
+def entry_points(group: str) -> dict[str, importlib.metadata.EntryPoint]:
+    """Return the entry points of a group that installed packages declare, by name."""
+    return {point.name: point for point in importlib.metadata.entry_points(group=group)}
+
+
+def method_names() -> dict[str, str]:
+    """Return the names of all known methods, each with where it comes from."""
+    names = dict.fromkeys(built_in_methods(), "built in")
+    names |= {name: f"entry point {point.value}" for name, point in _methods_by_point().items()}
+    names |= dict.fromkeys(_registered, "registered")
+    return names
+
+
+def _methods_by_point() -> dict[str, importlib.metadata.EntryPoint]:
+    return {
+        name: point
+        for name, point in entry_points(METHOD_GROUP).items()
+        if name not in built_in_methods()
+    }
+
+
+@dataclass(frozen=True)
+class MethodSpec:
+    """A method with its settings, ready to run in any process.
+
+    Attributes
+    ----------
+    source
+        Where to load it.
+    declaration
+        What it declares under these settings.
+    variant, parameters
+        What its constructor is given.
+    isolated
+        Whether it runs in a process of its own, as everything that is not built in.
+    digest
+        Digest of its source and settings.
+    shown
+        Label that tables show instead of the one that its settings make.
+    """
+
+    source: Source
+    declaration: Declaration
+    variant: str
+    parameters: dict[str, Any] = field(default_factory=dict)
+    isolated: bool = True
+    digest: str = ""
+    shown: str = ""
+
+    @property
+    def label(self) -> str:
+        """Name that tables show: `name[:variant][@parameter=value,...]`."""
+        if self.shown:
+            return self.shown
+        text = self.declaration.name
+        if self.variant:
+            text += f":{self.variant}"
+        if self.parameters:
+            settings = sorted(self.parameters.items())
+            text += "@" + ",".join(f"{key}={value}" for key, value in settings)
+        return text
+
+    def make(self) -> Any:
+        """Return a new estimator."""
+        return self.source.make(self.variant, self.parameters)
+
+
+def find_method(name: str) -> Source:
+    """Return the source of a method by name or `file.py:Class`.
+
+    Raises
+    ------
+    InputError
+        If there is no such method; the message names the nearest one.
+    """
+    if ".py" in name:
+        path, _, rest = name.partition(".py")
+        return Source("file", f"{Path(path + '.py').resolve()}:{rest.removeprefix(':')}")
+    if name in built_in_methods():
+        method = built_in_methods()[name]
+        return Source("module", f"{method.__module__}:{method.__qualname__}")
+    if name in _registered:
+        return _source_of_value(_registered[name])
+    if name in _methods_by_point():
+        return Source("module", _methods_by_point()[name].value)
+    raise unknown("method", name, method_names())
+
+
+def _source_of_value(method: Any) -> Source:
+    kind = method if inspect.isclass(method) else type(method)
+    if inspect.isclass(method) and kind.__module__ in {
+        item.__module__ for item in built_in_methods().values()
+    }:
+        return Source("module", f"{kind.__module__}:{kind.__qualname__}")
+    module = sys.modules.get(kind.__module__)
+    file = getattr(module, "__file__", None)
+    if inspect.isclass(method) and file and kind.__module__.startswith("gripbench_file_"):
+        return Source("file", f"{file}:{kind.__qualname__}")
+    return Source("value", kind.__qualname__, cloudpickle.dumps(method))
+
+
+def split_choice(text: str) -> tuple[str, str, dict[str, Any]]:
+    """Split `name[:variant][@parameter=value,...]` into its parts.
+
+    In `file.py:Class:variant` the class comes before the variant.
+
+    Examples
+    --------
+    >>> split_choice("slip_slope:paper@forgetting=0.99")
+    ('slip_slope', 'paper', {'forgetting': 0.99})
+    """
+    place, _, settings = text.partition("@")
+    head, dot, tail = place.rpartition(".py")
+    name, *variant = tail.split(":")
+    if dot:
+        class_name = variant.pop(0) if variant else ""
+        name = f"{head}.py:{class_name}" if class_name else f"{head}.py"
+    if len(variant) > 1:
+        raise InputError(f"method '{text}': more than one variant")
+    parameters: dict[str, Any] = {}
+    for item in filter(None, settings.split(",")):
+        key, _, value = item.partition("=")
+        try:
+            parameters[key.strip()] = float(value)
+        except ValueError:
+            raise InputError(f"method '{text}': '{item}' must be parameter=number") from None
+    return name, variant[0] if variant else "", parameters
+
+
+def choose_method(
+    method: Any, variant: str = "", parameters: Mapping[str, Any] | None = None
+) -> MethodSpec:
+    """Return a method with its settings.
+
+    Parameters
+    ----------
+    method
+        A choice as `split_choice` takes it, a class, or an instance.
+    variant, parameters
+        Settings, beside those in a text.
+
+    Raises
+    ------
+    InputError
+        If it is unknown, cannot be loaded or takes no such settings.
+    """
+    settings = dict(parameters or {})
+    if isinstance(method, str):
+        name, chosen, given = split_choice(method)
+        variant = variant or chosen
+        settings = given | settings
+        source = find_method(name)
+    else:
+        source = _source_of_value(method)
+    if variant == "corrected" and not source.payload:
+        variant = ""  # the default of every built-in: one name for one thing
+    isolated = not (source.kind == "module" and source.target.startswith("gripbench.methods."))
+    if isolated and source.kind != "value":
+        from gripbench.bench.running.sandbox import (
+            declare,  # a plug-in's code runs in its cage only
+        )
+
+        declaration = declare(source, variant, settings)
+    else:
+        declaration = declaration_of(source.make(variant, settings), variant, settings)
+    if isolated and declaration.name in built_in_methods():
+        raise InputError(
+            f"{source.target}: the name '{declaration.name}' is that of a built-in method; "
+            "give yours another"
+        )
+    return MethodSpec(
+        source=source,
+        declaration=declaration,
+        variant=variant,
+        parameters=settings,
+        isolated=isolated,
+        digest=_method_digest(source, declaration),
+    )
+
+
+def _method_digest(source: Source, declaration: Declaration) -> str:
+    if source.kind == "value":
+        code = digest(repr(source.payload))
+        if declaration.file and Path(declaration.file).is_file():
+            code = digest(code, source_digest(Path(declaration.file)))
+    else:
+        code = source_digest(Path(declaration.file))
+    settings = sorted(declaration.settings.items())
+    return digest(code, source.target.rpartition(":")[2], declaration.variant, repr(settings))
+
+
+class SuiteMethod(Configuration):
+    """A method of a suite with its settings."""
+
+    name: str
+    variant: str = ""
+    parameters: dict[str, float | str | bool] = Field(default_factory=dict)
+
+
+class Suite(Configuration):
+    """A named choice of scenarios, methods and seeds.
+
+    Attributes
+    ----------
+    name
+        Unique name; the file has the same.
+    description
+        One sentence.
+    scenarios
+        Names or paths of scenario files.
+    methods
+        `name[:variant]`, or a table with `name`, `variant` and `parameters`.
+    seeds
+        Number of seeds, from 0.
+    targets
+        Signals that tables show; empty: all that are estimated.
+    """
+
+    name: str
+    description: str
+    scenarios: tuple[str, ...] = Field(min_length=1)
+    methods: tuple[str | SuiteMethod, ...] = Field(min_length=1)
+    seeds: int = Field(default=100, ge=1)
+    targets: tuple[str, ...] = ()
+
+    def specs(self) -> list[MethodSpec]:
+        """Return its methods, ready to run."""
+        return [
+            choose_method(item)
+            if isinstance(item, str)
+            else choose_method(item.name, item.variant, item.parameters)
+            for item in self.methods
+        ]
+
+
+def suite_files() -> dict[str, Path]:
+    """Return the suites that ship with gripbench, by name."""
+    return {path.stem: path for path in sorted((CONFIGS / "suites").glob("*.toml"))}
+
+
+def load_suite(name: str) -> Suite:
+    """Return a suite by name or by the path of a TOML file.
+
+    Raises
+    ------
+    InputError
+        If there is no such suite or its file has a mistake.
+    """
+    files = suite_files()
+    if not name.endswith(".toml") and name not in files:
+        raise unknown("suite", name, files)
+    path = Path(name) if name.endswith(".toml") else files[name]
+    return parse(Suite, read_toml(path), path)
+
+
+def all_scenario_files() -> dict[str, Path]:
+    """Return the scenario files by name: those that ship and those of installed packages."""
+    return dict(_plugged_scenarios()) | scenario_files()
+
+
+def find_scenario(name: str) -> Scenario:
+    """Return a scenario by name, by the path of a TOML file, or as `recording:NAME`.
+
+    Raises
+    ------
+    InputError
+        If there is no such scenario; the message names the nearest one.
+    """
+    if name.startswith("recording:"):
+        from gripbench.bench.running.recorded_scenarios import recorded_scenario  # reads the log
+
+        return recorded_scenario(name)
+    files = all_scenario_files()
+    if name.endswith(".toml"):
+        return load_scenario(name)
+    if name not in files:
+        raise unknown("scenario", name, files)
+    return load_scenario(str(files[name]))
+
+
+def _plugged_scenarios() -> Iterator[tuple[str, Path]]:
+    for name, point in entry_points(SCENARIO_GROUP).items():
+        given = point.load()
+        place = Path(given() if isinstance(given, Callable) else given)  # type: ignore[arg-type]
+        if place.is_dir():
+            yield from ((path.stem, path) for path in sorted(place.glob("*.toml")))
+        else:
+            yield name, place

@@ -1,0 +1,1 @@
+"""The papers: published numbers and claims beside ours, one folder a paper."""

@@ -1,0 +1,1 @@
+"""Li, Du & Li (2014): evidence and figures."""

@@ -1,0 +1,1 @@
+"""Boards into tables, figures, report, leaderboard and history."""

@@ -1,0 +1,103 @@
+"""A plot of one run: a signal's truth, its estimates with their confidence, and their errors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gripbench.bench.publishing.figures.runs import Runs
+from gripbench.bench.publishing.figures.style import (
+    TRUTH,
+    axis_label,
+    axis_scale,
+    legend_above,
+    line,
+    new_figure,
+    series_style,
+)
+from gripbench.envs.signals import VARIANCE, signal
+from gripbench.errors import InputError, unknown
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+DEVIATIONS = 1.96
+"""Half width of the band around an estimate that gives its variance, in standard deviations."""
+
+MOST_POINTS = 4000
+"""A curve of more points than this is thinned: none of them could be told apart."""
+
+
+def run_plot(
+    runs: Runs,
+    scenario: str,
+    methods: Sequence[str],
+    name: str,
+    seed: int = 0,
+    start: float | None = None,
+    end: float | None = None,
+) -> Figure:
+    """Draw a signal of one run: truth and estimates above, errors below.
+
+    Parameters
+    ----------
+    runs
+        Where recordings and estimates come from.
+    scenario, seed
+        The run.
+    methods
+        Choices of methods, `name[:variant][@parameter=value,...]`.
+    name
+        The signal.
+    start, end
+        Part of the run [s]; all of it where none is given.
+
+    Raises
+    ------
+    InputError
+        If the run has no such signal, a method does not estimate it, or the part is empty.
+    """
+    signal(name)
+    truth = runs.recording(scenario, seed).truth
+    if name not in (truth.dtype.names or ()):
+        raise unknown(f"signal in the truth of {scenario}", name, truth.dtype.names or ())
+    time = truth["time"]
+    shown = np.flatnonzero(
+        (time >= (time[0] if start is None else start))
+        & (time <= (time[-1] if end is None else end))
+    )
+    if len(shown) < 2:
+        raise InputError(f"{scenario} has no samples there: it runs to {time[-1]:g} s")
+    shown = shown[:: max(1, len(shown) // MOST_POINTS)]
+    scale, unit = axis_scale(name)
+    figure = new_figure(5.0 if methods else 3.2)
+    rows = figure.subplots(2 if methods else 1, 1, sharex=True, squeeze=False)[:, 0]
+    line(rows[0], time[shown], scale * truth[name][shown], "Truth", TRUTH)
+    for index, method in enumerate(methods):
+        spec = runs.method(method)
+        if name not in spec.declaration.estimates:
+            raise unknown(f"estimate of {spec.label}", name, spec.declaration.estimates)
+        estimates = runs.estimates(scenario, method, seed)[shown]
+        look = series_style(index)
+        values = scale * estimates[name]
+        line(rows[0], time[shown], values, spec.label, look, index / len(methods))
+        line(
+            rows[1], time[shown], values - scale * truth[name][shown], spec.label, look,
+            index / len(methods),
+        )  # fmt: skip
+        if name in spec.declaration.variances:
+            deviation = DEVIATIONS * scale * np.sqrt(np.maximum(estimates[name + VARIANCE], 0.0))
+            rows[0].fill_between(
+                time[shown], values - deviation, values + deviation, color=look.color, alpha=0.15,
+                linewidth=0.0, zorder=2,
+            )  # fmt: skip
+    rows[0].set_ylabel(axis_label(name))
+    rows[-1].set_xlabel("Time [s]")
+    if methods:
+        rows[1].axhline(0.0, color="#000000", linewidth=0.8)
+        rows[1].set_ylabel("Error" if unit == "-" else f"Error [{unit}]")
+    legend_above(rows[0], 2 if max(map(len, methods), default=0) > 24 else 3)
+    figure.suptitle(f"{scenario}, seed {seed}", fontsize=9.5, x=0.01, ha="left")
+    return figure

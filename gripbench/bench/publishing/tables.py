@@ -1,0 +1,435 @@
+"""One description of a table, rendered for the terminal, Markdown, CSV, LaTeX and HTML.
+
+A table says what its columns are (title, unit, format, which value is best) and holds plain
+values; how they look is the renderer's matter. CSV keeps full precision, all others show the
+column's format. The best value of a column, within its group of rows, is bold, and every value
+that ties with it too: by default those that read the same as shown, or, where the caller knows
+more, those that a flag marks (statistical ties of a ranking).
+"""
+
+from __future__ import annotations
+
+import csv as csv_format
+import html as html_format
+import io
+import math
+import numbers
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import pandas as pd
+import rich.box
+import rich.table
+import rich.text
+from rich.console import Console
+
+from gripbench.bench.publishing.latex import latex_line, latex_number, latex_text
+from gripbench.errors import InputError, nearest, unknown
+
+MISSING = "–"
+"""What a renderer shows where there is no value; CSV leaves the cell empty."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column.
+
+    Attributes
+    ----------
+    key
+        Name of the value in each row.
+    title
+        Heading without unit.
+    unit
+        Unit, shown in brackets behind the title; empty: none.
+    format
+        Format specification of numbers as `format()` takes it, such as `.3g`; text is shown as
+        it is.
+    best
+        Which number of the column is the best one; empty: none.
+    tied
+        Name of a boolean in each row that says whether its value shares the best one's mark;
+        empty: those that read the same as the best.
+    """
+
+    key: str
+    title: str
+    unit: str = ""
+    format: str = ""
+    best: Literal["", "lowest", "highest"] = ""
+    tied: str = ""
+
+    @property
+    def heading(self) -> str:
+        """Title with unit."""
+        return f"{self.title} [{self.unit}]" if self.unit else self.title
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table: its columns and rows.
+
+    Attributes
+    ----------
+    columns
+        Columns from left to right.
+    rows
+        One mapping a row with a value for each column's key: number, text, boolean, or None
+        where there is none (NaN counts as none).
+    caption
+        What the table shows, one sentence; empty: none.
+    notes
+        Remarks below the table.
+    group_by
+        Key of a column: consecutive rows with the same value form a group; the best is sought
+        within each group and a rule divides them. Empty: one group.
+
+    Raises
+    ------
+    InputError
+        If a row lacks a value or there are two columns with one key.
+    """
+
+    columns: tuple[Column, ...]
+    rows: tuple[Mapping[str, Any], ...]
+    caption: str = ""
+    notes: tuple[str, ...] = ()
+    group_by: str = ""
+    _groups: tuple[range, ...] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "columns", tuple(self.columns))
+        object.__setattr__(self, "rows", tuple(self.rows))
+        object.__setattr__(self, "notes", tuple(self.notes))
+        keys = [column.key for column in self.columns]
+        if len(set(keys)) != len(keys):
+            raise InputError(f"table: a column occurs twice among {', '.join(keys)}")
+        needed = {*keys, *(column.tied for column in self.columns), self.group_by} - {""}
+        for index, row in enumerate(self.rows):
+            for key in needed - row.keys():
+                raise InputError(f"table: row {index} has no '{key}': {nearest(key, row)}")
+        object.__setattr__(self, "_groups", tuple(_groups(self.rows, self.group_by)))
+
+    @classmethod
+    def from_frame(
+        cls,
+        frame: pd.DataFrame,
+        columns: Iterable[Column],
+        caption: str = "",
+        notes: Iterable[str] = (),
+        group_by: str = "",
+    ) -> Table:
+        """Return the rows of a frame as a table; the frame may have more columns."""
+        rows = tuple({str(k): v for k, v in row.items()} for row in frame.to_dict("records"))
+        return cls(tuple(columns), rows, caption, tuple(notes), group_by)
+
+    @property
+    def groups(self) -> tuple[range, ...]:
+        """Indices of the rows of each group."""
+        return self._groups
+
+    def text(self, row: int, column: Column) -> str:
+        """Return a cell as shown, `MISSING` where there is no value."""
+        value = self.rows[row][column.key]
+        if is_missing(value):
+            return MISSING
+        if isinstance(value, bool | np.bool_):
+            return "yes" if value else "no"
+        if isinstance(value, numbers.Real):
+            return format(value, column.format)
+        return str(value)
+
+    def best(self) -> frozenset[tuple[int, str]]:
+        """Return the cells that are best, as (index of the row, key of the column)."""
+        cells: set[tuple[int, str]] = set()
+        for column in self.columns:
+            if column.best:
+                for group in self.groups:
+                    cells.update((row, column.key) for row in self._best_rows(column, group))
+        return frozenset(cells)
+
+    def _best_rows(self, column: Column, group: range) -> list[int]:
+        rows = [row for row in group if _is_number(self.rows[row][column.key])]
+        if not rows:
+            return []
+        choose = min if column.best == "lowest" else max
+        best = choose(rows, key=lambda row: self.rows[row][column.key])
+        if column.tied:
+            return [row for row in rows if row == best or bool(self.rows[row][column.tied])]
+        shown = self.text(best, column)
+        return [row for row in rows if self.text(row, column) == shown]
+
+
+def is_missing(value: Any) -> bool:
+    """Return whether a cell has no value: None, NaN or pandas' NA."""
+    return value is None or value is pd.NA or (isinstance(value, float) and math.isnan(value))
+
+
+def terminal(table: Table) -> rich.table.Table:
+    """Return a table that rich prints."""
+    shown = rich.table.Table(
+        box=rich.box.SIMPLE_HEAD,
+        title=table.caption or None,
+        caption="\n".join(table.notes) or None,
+        title_justify="left",
+        caption_justify="left",
+    )
+    for column in table.columns:
+        shown.add_column(
+            rich.text.Text(column.heading),
+            justify="right" if _is_numeric(table, column) else "left",
+            no_wrap=_is_numeric(table, column),
+        )
+    best = table.best()
+    for group in table.groups:
+        for row in group:
+            cells = [
+                rich.text.Text(
+                    table.text(row, column), style="bold" if (row, column.key) in best else ""
+                )
+                for column in table.columns
+            ]
+            shown.add_row(*cells, end_section=row == group[-1])
+    return shown
+
+
+def plain(table: Table) -> str:
+    """Return what the terminal shows as plain text at its natural width, `*` behind the best."""
+    best = table.best()
+    cells = [[column.heading for column in table.columns]]
+    for row in range(len(table.rows)):
+        cells.append(
+            [
+                table.text(row, column) + ("*" if (row, column.key) in best else "")
+                for column in table.columns
+            ]
+        )
+    widths = [max(len(line[j]) for line in cells) for j in range(len(table.columns))]
+    right = [_is_numeric(table, column) for column in table.columns]
+    lines = [
+        "  ".join(
+            text.rjust(width) if numeric else text.ljust(width)
+            for text, width, numeric in zip(line, widths, right, strict=True)
+        ).rstrip()
+        for line in cells
+    ]
+    lines.insert(1, "  ".join("-" * width for width in widths))
+    head = [table.caption, ""] if table.caption else []
+    tail = ["", *table.notes] if table.notes else []
+    return "\n".join([*head, *lines, *tail]) + "\n"
+
+
+def markdown(table: Table) -> str:
+    """Return the table as a Markdown pipe table, best in bold."""
+    best = table.best()
+    lines = [
+        "| " + " | ".join(_markdown(column.heading) for column in table.columns) + " |",
+        "|"
+        + "|".join("---:" if _is_numeric(table, column) else "---" for column in table.columns)
+        + "|",
+    ]
+    for row in range(len(table.rows)):
+        cells = []
+        for column in table.columns:
+            text = _markdown(table.text(row, column))
+            cells.append(f"**{text}**" if (row, column.key) in best else text)
+        lines.append("| " + " | ".join(cells) + " |")
+    head = [table.caption, ""] if table.caption else []
+    tail = [line for note in table.notes for line in ("", note)]
+    return "\n".join([*head, *lines, *tail]) + "\n"
+
+
+def csv(table: Table) -> str:
+    """Return the table as CSV at full precision: headings, then a line a row."""
+    file = io.StringIO()
+    writer = csv_format.writer(file, lineterminator="\n")
+    writer.writerow([column.heading for column in table.columns])
+    for row in table.rows:
+        writer.writerow([_csv(row[column.key]) for column in table.columns])
+    return file.getvalue()
+
+
+def latex(table: Table, standalone: bool = False) -> str:
+    r"""Return the table as LaTeX with booktabs, best in bold.
+
+    Parameters
+    ----------
+    table
+        The table.
+    standalone
+        A whole document of class article; otherwise a `table` environment that needs
+        `\usepackage{booktabs}` where it is included.
+    """
+    best = table.best()
+    alignment = "".join("r" if _is_numeric(table, column) else "l" for column in table.columns)
+    lines = [r"\begin{table}[htbp]", r"\centering"]
+    if table.caption:
+        lines.append(rf"\caption{{{latex_text(table.caption)}}}")
+    lines += [rf"\begin{{tabular}}{{@{{}}{alignment}@{{}}}}", r"\toprule"]
+    lines.append(latex_line([latex_text(column.heading) for column in table.columns]))
+    lines.append(r"\midrule")
+    for number, group in enumerate(table.groups):
+        if number:
+            lines.append(r"\midrule")
+        for row in group:
+            cells = []
+            for column in table.columns:
+                text = table.text(row, column)
+                number_shown = _is_number(table.rows[row][column.key])
+                text = latex_number(text) if number_shown else latex_text(text)
+                if (row, column.key) in best:
+                    text = rf"\textbf{{\boldmath {text}}}"
+                cells.append(text)
+            lines.append(latex_line(cells))
+    lines += [r"\bottomrule", r"\end{tabular}"]
+    if table.notes:
+        lines.append(r"\par\smallskip\footnotesize " + " ".join(map(latex_text, table.notes)))
+    lines.append(r"\end{table}")
+    body = "\n".join(lines) + "\n"
+    if not standalone:
+        return body
+    return (
+        "\\documentclass{article}\n\\usepackage{booktabs}\n"
+        f"\\begin{{document}}\n{body}\\end{{document}}\n"
+    )
+
+
+def html(table: Table) -> str:
+    """Return the table as an HTML `table` element.
+
+    Numbers carry their full value in `data-value`, so that a page can sort them; the best cells
+    have the class `best`; groups are `tbody` elements.
+    """
+    best = table.best()
+    lines = ['<table class="gripbench">']
+    if table.caption:
+        lines.append(f"<caption>{html_format.escape(table.caption)}</caption>")
+    lines.append("<thead><tr>")
+    for column in table.columns:
+        name = "number" if _is_numeric(table, column) else "text"
+        heading = html_format.escape(column.heading)
+        lines.append(f'<th scope="col" class="{name}">{heading}</th>')
+    lines.append("</tr></thead>")
+    for group in table.groups or (range(0),):
+        lines.append("<tbody>")
+        for row in group:
+            cells = "".join(
+                _html_cell(table, row, column, (row, column.key) in best)
+                for column in table.columns
+            )
+            lines.append(f"<tr>{cells}</tr>")
+        lines.append("</tbody>")
+    if table.notes:
+        notes = "<br/>".join(html_format.escape(note) for note in table.notes)
+        span = len(table.columns)
+        lines.append(f'<tfoot><tr><td colspan="{span}">{notes}</td></tr></tfoot>')
+    lines.append("</table>")
+    return "\n".join(lines) + "\n"
+
+
+FORMATS: dict[str, Callable[[Table], str]] = {
+    "text": plain,
+    "markdown": markdown,
+    "csv": csv,
+    "latex": latex,
+    "html": html,
+}
+"""Renderer by the name of the format."""
+
+_SUFFIXES = {".txt": "text", ".md": "markdown", ".csv": "csv", ".tex": "latex", ".html": "html"}
+
+
+def render(table: Table, format_name: str) -> str:
+    """Return a table in one of `FORMATS`.
+
+    Raises
+    ------
+    InputError
+        If there is no such format.
+    """
+    if format_name not in FORMATS:
+        raise unknown("table format", format_name, FORMATS)
+    return FORMATS[format_name](table)
+
+
+def show(table: Table, format_name: str = "terminal") -> None:
+    """Print a table: with rich on a terminal, else in one of `FORMATS`.
+
+    Raises
+    ------
+    InputError
+        If there is no such format.
+    """
+    if format_name not in ("terminal", *FORMATS):
+        raise unknown("table format", format_name, ("terminal", *FORMATS))
+    if format_name != "terminal":
+        print(render(table, format_name), end="")
+        return
+    console = Console()
+    if console.is_terminal:
+        console.print(terminal(table))
+    else:
+        print(plain(table), end="")
+
+
+def format_of(path: Path) -> str:
+    """Return the format that a file's suffix stands for.
+
+    Raises
+    ------
+    InputError
+        If none does.
+    """
+    if path.suffix not in _SUFFIXES:
+        raise unknown(f"table format of {path}", path.suffix, _SUFFIXES)
+    return _SUFFIXES[path.suffix]
+
+
+def _groups(rows: Sequence[Mapping[str, Any]], key: str) -> Iterable[range]:
+    first = 0
+    for index in range(1, len(rows) + 1):
+        if index == len(rows) or (key and rows[index][key] != rows[first][key]):
+            yield range(first, index)
+            first = index
+
+
+def _is_number(value: Any) -> bool:
+    number = isinstance(value, numbers.Real) and not isinstance(value, bool | np.bool_)
+    return number and not is_missing(value)
+
+
+def _is_numeric(table: Table, column: Column) -> bool:
+    """Whether a column holds numbers only; an empty one counts by its format."""
+    values = [row[column.key] for row in table.rows if not is_missing(row[column.key])]
+    return all(map(_is_number, values)) if values else bool(column.format)
+
+
+def _csv(value: Any) -> str:
+    if is_missing(value):
+        return ""
+    if isinstance(value, bool | np.bool_):
+        return "true" if value else "false"
+    if isinstance(value, numbers.Integral):
+        return str(int(value))
+    return repr(float(value)) if isinstance(value, numbers.Real) else str(value)
+
+
+def _markdown(text: str) -> str:
+    text = re.sub(r"([\\`*|<]|(?<!\w)_|_(?!\w))", r"\\\1", text)  # mu_front reads as it is
+    return text.replace("\n", " ")
+
+
+def _html_cell(table: Table, row: int, column: Column, best: bool) -> str:
+    value = table.rows[row][column.key]
+    text = html_format.escape(table.text(row, column))
+    attributes = ""
+    if _is_numeric(table, column):
+        names = "number best" if best else "number"
+        attributes = f' class="{names}"'
+    if _is_number(value):
+        attributes += f' data-value="{float(value)!r}"'
+    return f"<td{attributes}>{f'<strong>{text}</strong>' if best else text}</td>"

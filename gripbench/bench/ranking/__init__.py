@@ -1,0 +1,1 @@
+"""Rows into boards: which runs compare, statistics, ranks."""

@@ -1,0 +1,358 @@
+"""Rank methods, with the confidence that the runs allow.
+
+One board for each target and each set of instruments (see `ranking.grids`). The score of
+a method is the geometric mean over the scenarios of its pooled RMS, relative to the same of a
+reference: by default the geometric mean of all methods on the board that finished every run. Ranks
+and claims do not depend on that reference. A method that failed a run ranks behind all that
+did not, and the more it failed the further behind.
+
+See docs/ranking.md for what is computed, and `gripbench.bench.ranking.statistics` for how.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+
+from gripbench.bench.ranking import statistics
+from gripbench.bench.ranking.grids import (
+    ANY,
+    Grid,
+    chosen_instruments,
+    grid_of,
+    instruments,
+    on_board,
+    sensor_sets,
+)
+from gripbench.bench.ranking.pareto import pareto_front
+from gripbench.bench.running.rows import UTILISATION_BANDS, pooled_rms
+from gripbench.errors import InputError, unknown
+
+COLUMNS = (
+    "target", "sensors", "rank", "rank_from", "rank_to", "group", "label", "method", "variant",
+    "title", "reads", "idealised", "score", "score_from", "score_to", "rms", "rms_from", "rms_to",
+    "peak", "bias", "converged", "convergence_time", "mean_nees",
+    *(f"rms_{band}" for band, _, _ in UTILISATION_BANDS),
+    "step_batch", "step_p50", "step_p99", "step_max", "deadline_misses", "pareto",
+    "failures", "reason", "cells", "seeds", "scenarios",
+)  # fmt: skip
+"""Columns of a ranking; docs/ranking.md describes each."""
+
+
+@dataclass(frozen=True)
+class Board:
+    """A ranking of the methods that estimate one target with one set of instruments.
+
+    Attributes
+    ----------
+    target
+        Signal that is estimated.
+    sensors
+        Instruments that a method on this board may read; empty with `ANY`.
+    title
+        Target and instruments in words, and the scenarios where another board has the same.
+    confidence
+        Confidence of all its claims together, and of each interval.
+    scenarios
+        Names of the scenarios.
+    seeds
+        Seeds common to all methods.
+    lines
+        One line a method from best to worst, with `COLUMNS`.
+    p_better
+        Adjusted p-value that the method of the row has a lower RMS than that of the column.
+    wins
+        Runs in which the method of the row has a lower RMS than that of the column, half for a
+        draw; a failure loses.
+    notes
+        What was left out, one sentence each.
+    """
+
+    target: str
+    sensors: tuple[str, ...]
+    title: str
+    confidence: float
+    scenarios: tuple[str, ...]
+    seeds: tuple[int, ...]
+    lines: pd.DataFrame
+    p_better: pd.DataFrame
+    wins: pd.DataFrame
+    notes: tuple[str, ...]
+
+
+def rank(
+    rows: pd.DataFrame,
+    target: str | Iterable[str] = (),
+    sensors: str | Iterable[str] = (),
+    *,
+    scenarios: Iterable[str] = (),
+    labels: Iterable[str] = (),
+    reference: str = "",
+    confidence: float = statistics.CONFIDENCE,
+    resamples: int = statistics.RESAMPLES,
+    seed: int = 0,
+) -> pd.DataFrame:
+    """Rank methods from their rows.
+
+    Parameters
+    ----------
+    rows
+        Frame as `gripbench.run` or `gripbench.read_rows` returns it.
+    target
+        Signal or signals to rank by, each on boards of its own; empty: all.
+    sensors
+        Instruments that a method may read, names or one text with commas; empty: one board for
+        each set of instruments that a method reads; `any`: one board with all methods.
+    scenarios, labels
+        Only these scenarios and methods; empty: all.
+    reference
+        Method to which scores are relative; empty: the board's geometric mean.
+    confidence
+        Confidence that all claims of a board hold together, and of each interval of score and RMS.
+    resamples, seed
+        Bootstrap resamples and their seed.
+
+    Returns
+    -------
+    One line a board and method, best first, with `COLUMNS`.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown, or the methods have no runs in common.
+    """
+    found = boards(
+        rows,
+        target,
+        sensors,
+        scenarios=scenarios,
+        labels=labels,
+        reference=reference,
+        confidence=confidence,
+        resamples=resamples,
+        seed=seed,
+    )
+    return pd.concat([board.lines for board in found], ignore_index=True)
+
+
+def boards(
+    rows: pd.DataFrame,
+    target: str | Iterable[str] = (),
+    sensors: str | Iterable[str] = (),
+    *,
+    scenarios: Iterable[str] = (),
+    labels: Iterable[str] = (),
+    reference: str = "",
+    confidence: float = statistics.CONFIDENCE,
+    resamples: int = statistics.RESAMPLES,
+    seed: int = 0,
+) -> list[Board]:
+    """Return the boards behind `rank`, with their comparisons; parameters and errors as there."""
+    if not 0.5 <= confidence < 1.0:
+        raise InputError(f"confidence is {confidence:g}; it must be from 0.5 to below 1")
+    rows = _only(_only(rows, "scenario", scenarios), "label", labels)
+    targets = [target] if isinstance(target, str) else list(target)
+    known = [str(name) for name in rows["target"].unique() if name]
+    for name in targets:
+        if name and name not in known:
+            raise unknown("target", name, known)
+    if not known:
+        raise InputError("nothing to rank: no row has a target; run a method first")
+    settings = _Settings(reference, confidence, resamples, seed)
+    given = None if sensors == ANY else chosen_instruments(sensors)
+    found = []
+    for name in [name for name in targets if name] or sorted(known):
+        ran = rows[(rows["target"] == name) & (rows["status"] != "skipped")]
+        for allowed in sensor_sets(ran) if given == () else [given]:
+            parts = on_board(rows, name, allowed)
+            for lines, notes in parts:
+                grid = grid_of(lines, name, notes)
+                found.append(_board(grid, allowed, len(parts) > 1, settings))
+    if not found:
+        raise InputError("nothing to rank: every run was skipped")
+    return found
+
+
+@dataclass(frozen=True)
+class _Settings:
+    reference: str
+    confidence: float
+    resamples: int
+    seed: int
+
+
+def _only(rows: pd.DataFrame, column: str, chosen: Iterable[str]) -> pd.DataFrame:
+    names = [chosen] if isinstance(chosen, str) else list(chosen)
+    known = set(rows[column])
+    for name in names:
+        if name not in known:
+            raise unknown({"label": "method"}.get(column, column), name, known)
+    return rows[rows[column].isin(names)] if names else rows
+
+
+def _board(
+    grid: Grid, allowed: tuple[str, ...] | None, one_of_several: bool, settings: _Settings
+) -> Board:
+    target = grid.target
+    scenarios = tuple(sorted((*grid.scenarios, *grid.single)))
+    title = f"{target} with {'any sensors' if allowed is None else ', '.join(allowed)}"
+    ranks, p_better = _ranks(grid, settings)
+    lines = pd.DataFrame(
+        [
+            {**_summary(group, str(label) in grid.labels, settings), **ranks[str(label)]}
+            for label, group in grid.rows.groupby("label")
+        ]
+    )
+    lines["target"] = target
+    lines["sensors"] = ANY if allowed is None else ", ".join(allowed)
+    lines["cells"] = grid.cells
+    lines["seeds"] = len(grid.seeds) or 1
+    lines["scenarios"] = len(grid.scenarios) + len(grid.single)
+    lines["pareto"] = pareto_front(lines["score"], lines["step_batch"])
+    lines = lines[list(COLUMNS)].sort_values(["rank", "label"], ignore_index=True)
+    order = list(lines["label"])
+    runs = grid.rows.assign(rms=grid.rows["rms"].where(grid.rows["status"] == "ok"))
+    matrix = runs.pivot_table(
+        index=["scenario", "seed"], columns="label", values="rms", dropna=False
+    ).reindex(columns=order)
+    wins = statistics.wins(matrix.to_numpy(float))
+    complete = [label for label in order if label in grid.labels]
+    return Board(
+        target=target,
+        sensors=allowed or (),
+        title=title + (f" in {', '.join(scenarios)}" if one_of_several else ""),
+        confidence=settings.confidence,
+        scenarios=scenarios,
+        seeds=grid.seeds,
+        lines=lines,
+        p_better=p_better.reindex(index=complete, columns=complete),
+        wins=pd.DataFrame(wins, index=order, columns=order),
+        notes=grid.notes,
+    )
+
+
+def _ranks(grid: Grid, settings: _Settings) -> tuple[dict[str, dict[str, Any]], pd.DataFrame]:
+    """Return rank, interval, group and score of each method, and the adjusted p-values."""
+    labels = grid.labels
+    by_label: dict[str, dict[str, Any]] = {}
+    p = np.ones((len(labels), len(labels)))
+    if labels:
+        scores = statistics.mean_log_rms(
+            grid.sums_of_squares,
+            grid.counts,
+            grid.single_rms,
+            settings.resamples,
+            settings.seed,
+        )
+        p = statistics.adjusted_p_better(scores)
+        better = p <= 1.0 - settings.confidence
+        order = np.argsort(scores.estimate, kind="stable")
+        first, last = statistics.rank_intervals(better)
+        groups = statistics.tied_groups(better, order)
+        places = _places(scores.estimate, order)
+        score, low, high = _relative(scores, labels, settings)
+        for i, label in enumerate(labels):
+            by_label[label] = {
+                "rank": places[i],
+                "rank_from": int(first[i]),
+                "rank_to": int(last[i]),
+                "group": groups[i],
+                "score": score[i],
+                "score_from": low[i],
+                "score_to": high[i],
+                "failures": 0,
+            }
+    elif settings.reference:
+        raise unknown(f"reference on the board of {grid.target}", settings.reference, labels)
+    everyone = len(labels) + len(grid.incomplete)
+    for label, failures in grid.incomplete.items():
+        fewer = sum(other < failures for other in grid.incomplete.values())
+        by_label[label] = {
+            "rank": len(labels) + 1 + fewer,
+            "rank_from": len(labels) + 1,
+            "rank_to": everyone,
+            "group": "",
+            **dict.fromkeys(("score", "score_from", "score_to"), np.nan),
+            "failures": failures,
+        }
+    return by_label, pd.DataFrame(p, index=list(labels), columns=list(labels))
+
+
+def _places(estimate: npt.NDArray[np.float64], order: npt.NDArray[np.int64]) -> list[int]:
+    """Return ranks from 1; those that are equal but for rounding share the better one."""
+    places = [0] * len(order)
+    for position, index in enumerate(order):
+        before = order[position - 1]
+        same = position and (estimate[index] - estimate[before] < statistics.INDISTINGUISHABLE)
+        places[index] = places[before] if same else position + 1
+    return places
+
+
+def _relative(
+    scores: statistics.Scores, labels: tuple[str, ...], settings: _Settings
+) -> tuple[npt.NDArray[np.float64], ...]:
+    """Return scores relative to the reference with the ends of their intervals."""
+    if settings.reference and settings.reference not in labels:
+        raise unknown("reference on the board", settings.reference, labels)
+    chosen = [labels.index(settings.reference)] if settings.reference else slice(None)
+    shift = scores.estimate[chosen].mean()
+    base = scores.replicates[:, chosen].mean(axis=1, keepdims=True)
+    relative = scores.estimate - shift
+    errors = scores.standard_errors(base)
+    low, high = statistics.interval(relative, errors, scores.runs, settings.confidence)
+    return np.exp(relative), np.exp(low), np.exp(high)
+
+
+def _summary(group: pd.DataFrame, complete: bool, settings: _Settings) -> dict[str, Any]:
+    """Return what a method did over its runs on the board; no scores unless it finished all."""
+    first = group.iloc[0]
+    good = group[group["status"] == "ok"]
+    bad = group[group["status"] != "ok"]
+    by_seed = good.groupby("seed")[["sum_of_squares", "count"]].sum()
+    low, high = statistics.pooled_rms_interval(
+        by_seed["sum_of_squares"] if complete else [],
+        by_seed["count"] if complete else [],
+        settings.confidence,
+        settings.resamples,
+        settings.seed,
+    )
+    convergence = good["convergence_time"].astype(float).fillna(np.inf)
+    count = good["count"].astype(float)
+    line: dict[str, Any] = {
+        name: first[name] for name in ("label", "method", "variant", "title", "idealised")
+    }
+    line |= {
+        "reads": ", ".join(instruments(first["sensors"])),
+        "rms": pooled_rms(good["sum_of_squares"], good["count"]) if complete else np.nan,
+        "rms_from": low,
+        "rms_to": high,
+        "peak": good["peak"].max() if complete else np.nan,
+        "bias": (good["bias"] * count).sum() / count.sum() if complete else np.nan,
+        "converged": float(np.isfinite(convergence).mean()) if complete else np.nan,
+        "convergence_time": float(convergence.median()) if complete else np.nan,
+        "mean_nees": good["mean_nees"].astype(float).mean() if complete else np.nan,
+        "step_batch": good["step_batch"].astype(float).median(),
+        "step_p50": good["step_p50"].astype(float).median(),
+        "step_p99": good["step_p99"].astype(float).median(),
+        "step_max": good["step_max"].astype(float).max(),
+        "deadline_misses": good["deadline_misses"].astype(float).mean(),
+        "reason": "" if complete else _reason(bad),
+    }
+    for band, _, _ in UTILISATION_BANDS:
+        squares = good[f"sum_of_squares_{band}"].astype(float).fillna(0.0)
+        samples = good[f"count_{band}"].astype(float).fillna(0.0)
+        line[f"rms_{band}"] = pooled_rms(squares, samples) if complete else np.nan
+    return line
+
+
+def _reason(bad: pd.DataFrame) -> str:
+    """Return the most frequent status and reason of the failures."""
+    if bad.empty:
+        return "not run in every scenario"
+    texts = bad["status"].astype(str) + ": " + bad["reason"].astype(str)
+    return str(texts.value_counts(sort=True).index[0]).removesuffix(": ")

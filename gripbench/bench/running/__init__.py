@@ -1,0 +1,1 @@
+"""A plan into rows: cells, execution, sandbox, backends, store and keys."""

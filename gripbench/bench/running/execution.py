@@ -1,0 +1,192 @@
+"""Run one method over one recording: only its declared channels in, only its estimates out."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from numbers import Real
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from gripbench.bench.catalogue.declarations import Declaration
+from gripbench.bench.running.rows import Runtime
+from gripbench.bench.scoring.scoring import EstimateError
+from gripbench.envs.recordings import select_channels
+from gripbench.envs.signals import record_type
+from gripbench.errors import GripbenchError, UndeclaredChannelError, nearest
+
+ONLINE_SAMPLES = 2000
+"""Number of single calls whose time is taken where the batch form made the estimates."""
+
+
+class SkippedError(GripbenchError):
+    """The scenario does not give what the method needs."""
+
+
+class Observation(dict[str, float]):
+    """One sample: `time` and the declared channels; reading another channel names it."""
+
+    method = "the method"
+
+    def __missing__(self, channel: str) -> float:
+        raise UndeclaredChannelError(
+            f"{self.method} reads the channel '{channel}', which is not among its sensors"
+        )
+
+
+class VehicleOnPaper(dict[str, float]):
+    """Vehicle parameters; reading one that the vehicle's file does not give skips the cell."""
+
+    def __missing__(self, parameter: str) -> float:
+        raise SkippedError(f"the vehicle does not give the parameter '{parameter}'")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Estimates of one run and the time that they took.
+
+    Attributes
+    ----------
+    estimates
+        Structured array, shape (n,).
+    runtime
+        Times of its steps [s].
+    """
+
+    estimates: npt.NDArray[Any]
+    runtime: Runtime
+
+
+def missing(
+    declaration: Declaration, vehicle: Mapping[str, float], channels: tuple[str, ...]
+) -> str:
+    """Return why a method cannot run where only these channels are given; empty: it can."""
+    lacking = [name for name in declaration.sensors if name not in channels]
+    if lacking:
+        return "the scenario has no sensor for " + ", ".join(f"'{name}'" for name in lacking)
+    lacking = [name for name in declaration.vehicle_parameters if name not in vehicle]
+    if lacking:
+        return "the vehicle does not give " + ", ".join(f"'{name}'" for name in lacking)
+    return ""
+
+
+def execute(
+    method: Any,
+    declaration: Declaration,
+    vehicle: Mapping[str, float],
+    observations: npt.NDArray[Any],
+    period: float,
+    timed: bool,
+) -> Outcome:
+    """Run a method over a recording.
+
+    Parameters
+    ----------
+    method
+        An estimator.
+    declaration
+        What it declares.
+    vehicle
+        Vehicle parameters by name.
+    observations
+        Structured array, shape (n,), with at least the declared channels.
+    period
+        Nominal time [s] between samples.
+    timed
+        Whether single calls are timed where the batch form makes the estimates.
+    """
+    selected = select_channels(observations, declaration.sensors)
+    paper = VehicleOnPaper(vehicle)
+    if callable(getattr(method, "run", None)):
+        method.run(paper, selected[:2])  # compiles; its time is no step's time
+        began = time.perf_counter()
+        estimates = method.run(paper, selected)
+        batch = (time.perf_counter() - began) / max(len(selected), 1)
+        calls = np.empty(0)
+        if timed:
+            _, calls = _online(method, declaration, paper, selected[: ONLINE_SAMPLES + 10])
+            calls = calls[10:]
+    else:
+        estimates, calls = _online(method, declaration, paper, selected)
+        batch = float(calls.mean())
+    return Outcome(estimates, _runtime(batch, calls, period))
+
+
+def run_online(
+    method: Any,
+    declaration: Declaration,
+    vehicle: Mapping[str, float],
+    observations: npt.NDArray[Any],
+) -> npt.NDArray[Any]:
+    """Return the estimates of a method that is given one sample at a time."""
+    selected = select_channels(observations, declaration.sensors)
+    return _online(method, declaration, VehicleOnPaper(vehicle), selected)[0]
+
+
+def _online(
+    method: Any,
+    declaration: Declaration,
+    vehicle: VehicleOnPaper,
+    observations: npt.NDArray[Any],
+) -> tuple[npt.NDArray[Any], npt.NDArray[np.float64]]:
+    names = observations.dtype.names or ()
+    outputs = declaration.outputs
+    estimates = np.empty(len(observations), record_type(outputs))
+    values = estimates.view(np.float64).reshape(len(observations), len(outputs))
+    times = observations["time"]
+    step = float(times[1] - times[0]) if len(times) > 1 else 0.0
+    took = np.empty(len(observations), np.int64)
+    clock = time.perf_counter_ns
+    method.reset(VehicleOnPaper(vehicle), step)
+    update = method.update
+    for k, sample in enumerate(observations.tolist()):
+        obs = Observation(zip(names, sample, strict=True))
+        obs.method = declaration.name
+        began = clock()
+        given = update(obs)
+        took[k] = clock() - began
+        try:
+            values[k] = [given[name] for name in outputs]
+        except (KeyError, TypeError, ValueError, IndexError):
+            raise _wrong(given, outputs) from None
+        if len(given) != len(outputs):
+            raise _wrong(given, outputs)
+    return estimates, took.astype(np.float64) * 1e-9
+
+
+def _wrong(given: Any, outputs: tuple[str, ...]) -> GripbenchError:
+    """Return what is wrong with the mapping that `update` returned."""
+    if not isinstance(given, Mapping):
+        return EstimateError(
+            f"update returned {type(given).__name__}; return a dict with {', '.join(outputs)}"
+        )
+    for name in outputs:
+        if name not in given:
+            hint = nearest(name, given) if given else "it is empty"
+            return EstimateError(
+                f"the estimate '{name}' is declared but update does not return it: {hint}"
+            )
+        if not isinstance(given[name], Real):
+            return EstimateError(
+                f"the estimate '{name}' is {type(given[name]).__name__}; return a number"
+            )
+    surplus = next(name for name in given if name not in outputs)
+    return UndeclaredChannelError(
+        f"update returns the estimate '{surplus}', which is not among its estimates"
+    )
+
+
+def _runtime(batch: float, calls: npt.NDArray[np.float64], period: float) -> Runtime:
+    if not len(calls):
+        return Runtime(batch=batch)
+    return Runtime(
+        batch=batch,
+        p50=float(np.quantile(calls, 0.5)),
+        p99=float(np.quantile(calls, 0.99)),
+        maximum=float(calls.max()),
+        samples=len(calls),
+        deadline_misses=float(np.mean(calls > period)),
+    )

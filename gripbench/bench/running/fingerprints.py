@@ -1,0 +1,61 @@
+"""Digests of what a result depends on: the source of a method and all that it imports.
+
+The digest of a method covers its file and, from import to import, every module of gripbench and
+of its own folder or package, so that editing a shared module runs again exactly the methods that
+import it. Modules of other packages enter by their version. Imports are read from the source, so
+no code runs for it.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import inspect
+import json
+import platform
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import gripbench
+from gripbench.bench.running import recorded_scenarios
+from gripbench.envs import worlds
+from gripbench.envs.scenarios import Scenario
+from gripbench.envs.vehicles import load_vehicle
+from gripbench.sources import digest, source_digest
+
+_PROJECT = Path(gripbench.__file__).parent
+
+
+@cache
+def versions() -> dict[str, str]:
+    """Return the versions that every result depends on, by name."""
+    names = ("numpy", "numba", "scipy")
+    found = {name: importlib.metadata.version(name) for name in names}
+    return {"python": platform.python_version(), "machine": platform.machine(), **found}
+
+
+def scenario_digest(scenario: Scenario) -> str:
+    """Return the digest of all that a recording depends on besides the seed."""
+    if isinstance(scenario, recorded_scenarios.RecordedScenario):
+        windows = inspect.getsource(recorded_scenarios)
+        return digest(scenario.content, scenario.absent, windows, source_digest(_RECORDED))
+    world = worlds.WORLDS[scenario.world]
+    classes: tuple[Any, ...] = (world.scenario, world.simulation)
+    files = [Path(inspect.getfile(item)) for item in classes]
+    content = {
+        "scenario": scenario.model_dump(mode="json"),
+        "sensors": {name: item.model_dump() for name, item in scenario.all_sensors().items()},
+        "vehicle": load_vehicle(scenario.vehicle).values(),
+    }
+    sources = source_digest(*files, *(_PROJECT / "envs" / name for name in _RECORDING))
+    return digest(json.dumps(content, sort_keys=True), sources, inspect.getsource(worlds.record))
+
+
+_RECORDED = _PROJECT / "logs" / "excitation.py"
+_RECORDING = ("instruments/sensors.py", "recordings.py", "vehicles.py", "plants/simulation.py")
+
+
+@cache
+def scoring_digest() -> str:
+    """Return the digest of the code that turns estimates into scores."""
+    return source_digest(_PROJECT / "bench" / "scoring" / "scoring.py")

@@ -1,0 +1,363 @@
+"""Recordings of real vehicles as scenarios of a run: every window of the test time is one run.
+
+`recording:NAME` is a published recording or one that `gripbench import` has stored below
+`recordings`; `recording:FOLDER` is one stored elsewhere. A method runs from the start of the log to
+the end of the window, as in a vehicle, and is scored inside the window only. What the map sets for
+a method holds unless the user sets it otherwise.
+
+Where only an interval is known of a signal, the error is the distance from the interval.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass, replace
+from functools import lru_cache
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import Field, model_validator
+
+from gripbench.bench.catalogue.declarations import declaration_of
+from gripbench.envs.instruments.sensors import Sensor
+from gripbench.envs.recordings import Recording
+from gripbench.envs.scenarios import Scenario
+from gripbench.envs.signals import record_type
+from gripbench.envs.worlds import record
+from gripbench.errors import InputError
+
+if TYPE_CHECKING:
+    from gripbench.bench.catalogue.registry import MethodSpec
+    from gripbench.logs.importing import ImportedLog
+
+PREFIX = "recording:"
+"""What the names of these scenarios begin with."""
+
+SHORTEST = 3.0
+"""Length [s] of a window, longer where there would be more than `MOST`."""
+
+MOST = 20
+"""Windows that a recording has at most, about."""
+
+STORED = Path("recordings")
+"""Where `gripbench import` keeps recordings unless told otherwise."""
+
+_ANGLES = ("yaw", "sideslip", "course")
+_Interval = tuple[float, float]
+
+
+class RecordedScenario(Scenario):
+    """A recording as a scenario; it is loaded, not simulated.
+
+    Attributes
+    ----------
+    place
+        Name of a published recording, or folder of a stored one.
+    runs
+        Number of windows: its seeds are 0 to `runs - 1`.
+    settings
+        Parameters of methods, by method, that its map sets.
+    absent
+        Why it cannot be loaded here; empty: it can.
+    content
+        Digest of all its samples and of what its map says.
+    """
+
+    name: str = Field(pattern=r"^recording:[a-z][a-z0-9_]*$")
+    world: str = "recorded"
+    sample_time: float = Field(gt=0.0)
+    horizon: float = Field(gt=0.0)
+    integrator: str = ""
+    sensor_suite: str = ""
+    place: str
+    runs: int = Field(ge=1)
+    settings: dict[str, dict[str, float]] = {}
+    absent: str = ""
+    content: str = ""
+
+    @model_validator(mode="after")
+    def _check_samples(self) -> Self:
+        return self  # a log's samples come when they come
+
+    def all_sensors(self) -> dict[str, Sensor]:
+        """Return no sensor model: the log has the samples."""
+        return {}
+
+
+@dataclass(frozen=True)
+class Window:
+    """One run of a recorded scenario: an interval [s] of one of the log's recordings."""
+
+    recording: int
+    start: float
+    end: float
+
+
+def recorded_scenario(place: str) -> RecordedScenario:
+    """Return a recording as a scenario.
+
+    Parameters
+    ----------
+    place
+        Name of a published recording, of one stored below `recordings`, or a folder.
+
+    Raises
+    ------
+    InputError
+        If there is no such recording, or nothing of it is to be scored.
+    """
+    from gripbench.logs.published import AbsentDataError
+
+    place = _place(place.removeprefix(PREFIX))
+    try:
+        imported = _load(place)
+    except AbsentDataError as error:
+        return RecordedScenario(
+            name=PREFIX + place, description="", vehicle="", horizon=1.0, sample_time=1.0,
+            place=place, runs=1, absent=str(error), content="absent",
+        )  # fmt: skip
+    windows = windows_of(imported.recordings)
+    said = imported.provenance
+    times = [recording.observations["time"] for recording in imported.recordings]
+    return RecordedScenario(
+        name=PREFIX + said.name,
+        description=said.description,
+        vehicle=str(said.channel_map.get("vehicle", "")),
+        horizon=float(max(time[-1] for time in times)),
+        sample_time=float(np.median(np.concatenate([np.diff(time) for time in times]))),
+        place=place,
+        runs=len(windows),
+        settings=said.channel_map.get("settings", {}),
+        content=_digest(imported),
+    )
+
+
+def at_hand(name: str) -> bool:
+    """Tell whether a scenario is simulated, or a recording whose samples are here."""
+    if not name.startswith(PREFIX):
+        return True
+    try:
+        return not recorded_scenario(name).absent
+    except InputError:
+        return False
+
+
+def recording_of(scenario: Scenario, seed: int) -> Recording:
+    """Return one run of a scenario: simulated, or a window of a log.
+
+    Of a log the truth is NaN outside the window. Signals without truth there are left out, and so
+    are those of the reference that the methods may read.
+
+    Raises
+    ------
+    InputError
+        If a log has fewer windows, or is not at hand.
+    """
+    if not isinstance(scenario, RecordedScenario):
+        return record(scenario, seed)
+    if scenario.absent:
+        raise InputError(scenario.absent)
+    imported = _load(scenario.place)
+    recordings = imported.recordings
+    windows = windows_of(recordings)
+    if seed >= len(windows):
+        raise InputError(f"{scenario.name}: has {len(windows)} windows, so no seed {seed}")
+    chosen = windows[seed]
+    given = imported.provenance.channel_map.get("derived", {}).get("instruments", ())
+    return _part(recordings[chosen.recording], chosen, scenario.name, seed, tuple(given))
+
+
+def on_recording(spec: MethodSpec, scenario: Scenario) -> MethodSpec:
+    """Return a method with the settings that a recording's map has for it, under the same label.
+
+    Raises
+    ------
+    InputError
+        If the map sets what the method does not have.
+    """
+    given = scenario.settings if isinstance(scenario, RecordedScenario) else {}
+    if spec.declaration.name not in given:
+        return spec
+    settings = given[spec.declaration.name] | spec.parameters
+    try:
+        if spec.isolated and spec.source.kind != "value":
+            from gripbench.bench.running.sandbox import declare
+
+            declaration = declare(spec.source, spec.variant, settings)
+        else:
+            made = spec.source.make(spec.variant, settings)
+            declaration = declaration_of(made, spec.variant, settings)
+    except InputError as error:
+        name = spec.declaration.name
+        raise InputError(f"{scenario.name}: key 'settings.{name}': {error}") from None
+    return replace(spec, declaration=declaration, parameters=settings, shown=spec.label)
+
+
+def judged(recording: Recording, estimates: npt.NDArray[Any]) -> Recording:
+    """Return a recording whose truth is, of all that agrees with what is known, next to estimates.
+
+    Angles are brought to within half a turn of the estimate, and a signal of which an interval
+    is known becomes the point of the interval that is next to it.
+
+    Parameters
+    ----------
+    recording
+        A window of a log.
+    estimates
+        Structured array, shape (n,).
+    """
+    names = set(estimates.dtype.names or ()) & set(recording.truth.dtype.names or ())
+    intervals = [bound for bound in recording.bounds if bound.signal in names]
+    if estimates.shape != recording.truth.shape or not (names & {*_ANGLES} or intervals):
+        return recording
+    truth = recording.truth.copy()
+    for name in names & {*_ANGLES}:
+        error = estimates[name] - truth[name]
+        truth[name] = estimates[name] - np.arctan2(np.sin(error), np.cos(error))
+    time = truth["time"]
+    for bound in intervals:
+        inside = (time >= max(bound.start, recording.score_from)) & (time <= bound.end)
+        nearest = np.clip(estimates[bound.signal], bound.low, bound.high)
+        truth[bound.signal][inside] = nearest[inside]
+    return replace(recording, truth=truth)
+
+
+def windows_of(recordings: tuple[Recording, ...]) -> tuple[Window, ...]:
+    """Return the windows of a log: its test time, cut where an interval begins or ends to be known.
+
+    Raises
+    ------
+    InputError
+        If nothing is to be scored.
+    """
+    pieces = [
+        (index, start, end)
+        for index, recording in enumerate(recordings)
+        for start, end in _pieces(recording)
+    ]
+    if not pieces:
+        raise InputError(f"{recordings[0].scenario}: no sample lies in a window 'test'")
+    length = max(SHORTEST, sum(end - start for _, start, end in pieces) / MOST)
+    windows = []
+    for index, start, end in pieces:
+        edges = np.linspace(start, end, max(1, round((end - start) / length)) + 1)
+        for low, high in pairwise(edges):
+            windows.append(Window(index, float(low), float(high)))
+    return tuple(windows)
+
+
+def _pieces(recording: Recording) -> list[_Interval]:
+    time = recording.truth["time"]
+    last = float(time[-1])
+    given = recording.windows.get("test", ()) if recording.windows else ((0.0, last),)
+    cuts = {cut for bound in recording.bounds for cut in (bound.start, bound.end)}
+    found = []
+    for start, end in given:
+        first, final = max(start, recording.score_from), min(end, last)
+        edges = [first, *sorted(cut for cut in cuts if first < cut < final), final]
+        found += [
+            (low, high) for low, high in pairwise(edges) if ((time >= low) & (time <= high)).any()
+        ]
+    return found
+
+
+def _part(
+    recording: Recording, window: Window, name: str, seed: int, given: tuple[str, ...]
+) -> Recording:
+    from gripbench.logs.excitation import utilisation_bound
+
+    time = recording.truth["time"]
+    kept = slice(0, int(np.searchsorted(time, window.end, side="right")))
+    inside = time[kept] >= window.start
+    truth = recording.truth[kept]
+    bounds = tuple(
+        bound
+        for bound in recording.bounds
+        if bound.start < window.end and bound.end > window.start
+        and bound.signal not in (truth.dtype.names or ())
+    )  # fmt: skip
+    columns = {
+        signal: np.where(inside, truth[signal], np.nan)
+        for signal in truth.dtype.names or ()
+        if signal not in ("time", *given) and not signal.endswith("_new")
+    }
+    used = utilisation_bound(recording)
+    if used is not None:
+        columns["utilisation"] = np.where(inside, used[kept], np.nan)
+    columns = {signal: values for signal, values in columns.items() if np.isfinite(values).any()}
+    if bounds:
+        # The delay after excitation asks for the acceleration; an interval cannot answer it.
+        columns.pop("accel_y", None)
+        columns |= {bound.signal: np.full(len(truth), np.nan) for bound in bounds}
+    shown = np.empty(len(truth), record_type(["time", *columns]))
+    shown["time"] = truth["time"]
+    for signal, values in columns.items():
+        shown[signal] = values
+    return replace(
+        recording,
+        scenario=name,
+        seed=seed,
+        observations=recording.observations[kept],
+        truth=shown,
+        score_from=window.start,
+        windows={"test": ((window.start, window.end),)},
+        bounds=bounds,
+    )
+
+
+def _place(name: str) -> str:
+    from gripbench.errors import unknown
+    from gripbench.logs.published import recording_files
+
+    if name in recording_files():
+        return name
+    for folder in (Path(name), STORED / name):
+        if (folder / "recording.json").is_file():
+            return str(folder.resolve())
+    if Path(name).is_dir():
+        raise InputError(f"{name}: is no recording; gripbench import makes one of a log")
+    stored = {path.parent.name for path in STORED.glob("*/recording.json")}
+    raise unknown("recording", name, {*recording_files(), *stored})
+
+
+def _load(place: str) -> ImportedLog:
+    from gripbench.logs.locations import data_folder
+    from gripbench.logs.published import recording_files
+
+    if place in recording_files():
+        return _published(place, data_folder())
+    about = Path(place) / "recording.json"
+    return _stored(place, about.stat().st_mtime_ns if about.is_file() else 0)
+
+
+@lru_cache(maxsize=4)
+def _published(name: str, folder: Path) -> ImportedLog:
+    from gripbench.logs.published import load_recording
+
+    return load_recording(name, folder)
+
+
+@lru_cache(maxsize=4)
+def _stored(place: str, changed: int) -> ImportedLog:
+    from gripbench.logs.storing import load
+
+    del changed  # part of the cache's key only: the log may be imported again
+    return load(Path(place))
+
+
+def _digest(imported: ImportedLog) -> str:
+    state = hashlib.sha256()
+    for recording in imported.recordings:
+        for records in (recording.observations, recording.truth):
+            state.update(repr(records.dtype.names).encode())
+            state.update(records.tobytes())
+        said = (recording.vehicle, recording.windows, recording.score_from, recording.notes)
+        state.update(json.dumps(said, sort_keys=True).encode())
+        state.update(repr([asdict(bound) for bound in recording.bounds]).encode())
+    settings = imported.provenance.channel_map.get("settings", {})
+    state.update(json.dumps(settings, sort_keys=True).encode())
+    return state.hexdigest()

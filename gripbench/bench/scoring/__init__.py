@@ -1,0 +1,1 @@
+"""Estimates and truth into scores."""

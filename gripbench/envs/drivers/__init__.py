@@ -1,0 +1,1 @@
+"""Drivers and the profiles that they follow."""

@@ -1,0 +1,1 @@
+"""The plants: right-hand sides, integrators and their simulations."""

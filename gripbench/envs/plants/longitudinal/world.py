@@ -1,0 +1,393 @@
+"""The longitudinal world: scenarios of Li, Du & Li (2014) and their simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any, ClassVar, Literal, Self
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import Field, field_validator, model_validator
+
+from gripbench.configuration import Configuration
+from gripbench.envs.drivers.profiles import (
+    Segment,
+    breakpoints,
+    check_range,
+    profile_value,
+    profile_values,
+    segment_records,
+)
+from gripbench.envs.plants.longitudinal import integrators
+from gripbench.envs.plants.longitudinal.paper_solver import STOP_EVERY, paper_solver, set_inputs
+from gripbench.envs.plants.longitudinal.plant import (
+    INPUT_TYPE,
+    TYRE_TYPE,
+    compiled,
+    evaluate_tyres,
+    gravity_along,
+    plant_record,
+    rates,
+)
+from gripbench.envs.plants.simulation import Action, Lanes, Simulation
+from gripbench.envs.scenarios import Scenario
+from gripbench.envs.signals import record_type
+from gripbench.envs.tyres.longitudinal import slip_ratio
+from gripbench.envs.vehicles import Vehicle
+from gripbench.errors import GripbenchError
+
+PAPER_SOLVER = "paper"
+
+_FULL_TORQUE = 5000.0
+_FIRST_STEP = 1e-5  # of the integrator [s]; it then chooses its own
+NOISE_BLOCK = 1024  # process noise is drawn ahead in blocks; the stream is the same for any size
+
+
+class TorqueDriver(Configuration):
+    """Torque [N m] on each axle over time; the rear axle follows the front unless given."""
+
+    front: tuple[Segment, ...]
+    rear: tuple[Segment, ...] | None = None
+
+    @field_validator("front", "rear")
+    @classmethod
+    def _check_range(cls, torque: tuple[Segment, ...] | None) -> tuple[Segment, ...] | None:
+        check_range(torque or (), -_FULL_TORQUE, _FULL_TORQUE)
+        for before, after in pairwise(sorted(torque or (), key=lambda s: s.start)):
+            if after.start < before.end:
+                raise ValueError(f"pieces overlap at {after.start:g} s")
+        return torque
+
+
+class LongitudinalScenario(Scenario):
+    """A scenario of straight driving, wheels lumped to axles.
+
+    Attributes
+    ----------
+    initial_speed
+        Speed at the start [m/s]; the wheels roll without slip.
+    road_grade
+        Inclination [rad], positive downhill.
+    friction
+        Friction coefficient over time, both axles.
+    wheel_speed_noise
+        Process noise: relative standard deviation of the wheel speeds' jumps after each
+        millisecond; 0 in the paper's solver, whose own error takes its place.
+    driver
+        Torque profiles.
+    """
+
+    world: Literal["longitudinal"]
+    integrator: Literal["ros3", "rk4", "paper"] = "ros3"
+    initial_speed: float = Field(default=1.0, ge=0.0, le=100.0)
+    road_grade: float = Field(default=0.0, ge=-0.5, le=0.5)
+    friction: tuple[Segment, ...] = Field(min_length=1)
+    wheel_speed_noise: float = Field(default=0.0, ge=0.0, le=0.1)
+    driver: TorqueDriver
+
+    @field_validator("friction")
+    @classmethod
+    def _check_range(cls, friction: tuple[Segment, ...]) -> tuple[Segment, ...]:
+        check_range(friction, 0.01, 2.0)
+        return friction
+
+    @model_validator(mode="after")
+    def _check_friction(self) -> Self:
+        covered = 0.0
+        for piece in sorted(self.friction, key=lambda s: s.start):
+            if piece.start != covered:
+                raise ValueError(f"friction has a gap or an overlap at {piece.start:g} s")
+            covered = piece.end
+        if covered < self.horizon:
+            raise ValueError(f"friction ends at {covered:g} s, before the horizon")
+        if self.integrator == PAPER_SOLVER and self.wheel_speed_noise > 0.0:
+            raise ValueError("wheel_speed_noise has no meaning with the paper's solver")
+        return self
+
+
+TRUTH_TYPE = record_type(
+    (
+        "time",
+        "speed_x",
+        "wheel_speed_front",
+        "wheel_speed_rear",
+        "slip_ratio_front",
+        "slip_ratio_rear",
+        "force_x_front",
+        "force_x_rear",
+        "mu_front",
+        "mu_rear",
+        "utilisation",
+        "torque_front",
+        "torque_rear",
+        "accel_x",
+        "speed_x_rate",
+        "wheel_acceleration_front",
+        "wheel_acceleration_rear",
+        "road_grade",
+    )
+)
+
+
+@compiled
+def _write_truth(time, x, inputs, plant, tyres, truth):  # type: ignore[no-untyped-def]
+    force_front = inputs.mu_front * plant.load_front * tyres.front
+    force_rear = inputs.mu_rear * plant.load_rear * tyres.rear
+    gravity = gravity_along(inputs)
+    speed_rate, front_rate, rear_rate = rates(
+        x[0], x[1], x[2], force_front, force_rear, gravity, inputs, plant
+    )
+    truth.time = time
+    truth.speed_x = x[0]
+    truth.wheel_speed_front = x[1]
+    truth.wheel_speed_rear = x[2]
+    truth.slip_ratio_front = slip_ratio(plant.wheel_radius * x[1], x[0])
+    truth.slip_ratio_rear = slip_ratio(plant.wheel_radius * x[2], x[0])
+    truth.force_x_front = force_front
+    truth.force_x_rear = force_rear
+    truth.mu_front = inputs.mu_front
+    truth.mu_rear = inputs.mu_rear
+    limit = inputs.mu_front * plant.load_front + inputs.mu_rear * plant.load_rear
+    truth.utilisation = abs(force_front + force_rear) / limit
+    truth.torque_front = inputs.torque_front
+    truth.torque_rear = inputs.torque_rear
+    truth.speed_x_rate = speed_rate
+    truth.accel_x = speed_rate - gravity
+    truth.wheel_acceleration_front = front_rate
+    truth.wheel_acceleration_rear = rear_rate
+    truth.road_grade = inputs.road_grade
+
+
+@compiled
+def advance_one(  # type: ignore[no-untyped-def]
+    k, sample_time, x, step, inputs, plant, integrator, jumps, tyres, work, truth
+):
+    """Advance from sample `k` to the next; `jumps` are the wheel speeds' relative jumps at it."""
+    step = integrators.integrate(x, step, sample_time, inputs, plant, integrator, tyres, work)
+    x[1] *= 1.0 + jumps[0]
+    x[2] *= 1.0 + jumps[1]
+    evaluate_tyres(x, plant, tyres)
+    _write_truth((k + 1) * sample_time, x, inputs, plant, tyres, truth)
+    return step
+
+
+@compiled
+def command(k, sample_time, front, rear, friction, grade, inputs):  # type: ignore[no-untyped-def]
+    """Write what acts from sample `k` to the next: the profiles at the middle of the interval.
+
+    A held mean is exact for a constant and second-order accurate for a slope; a jump of a profile
+    that lies on a sample is met exactly.
+    """
+    set_inputs(inputs, (k + 0.5) * sample_time, front, rear, friction, grade)
+
+
+@compiled
+def _run(  # type: ignore[no-untyped-def]
+    sample_time, x, step, inputs, plant, integrator, profiles, jumps, tyres, work, truth
+):
+    """Run to the end; `inputs` holds the road grade, the profiles give all else."""
+    count = truth.shape[0] - 1
+    middles = (np.arange(count) + 0.5) * sample_time
+    front = profile_values(middles, profiles[0])
+    rear = profile_values(middles, profiles[1])
+    friction = profile_values(middles, profiles[2])
+    now = inputs[0]
+    for k in range(count):
+        now.torque_front = front[k]
+        now.torque_rear = rear[k]
+        now.mu_front = friction[k]
+        now.mu_rear = friction[k]
+        step = advance_one(
+            k, sample_time, x, step, now, plant[0], integrator, jumps[k], tyres[0], work,
+            truth[k + 1],
+        )  # fmt: skip
+
+
+@compiled
+def _sampled_truth(  # type: ignore[no-untyped-def]
+    times, states, inputs, plant, profiles, grade, tyres, truth
+):
+    front, rear, friction = profiles
+    last = times[-1] - 1e-12  # profiles end at the horizon; its sample belongs to their inside
+    for k in range(times.shape[0]):
+        set_inputs(inputs[0], min(times[k], last), front, rear, friction, grade)
+        evaluate_tyres(states[k], plant[0], tyres[0])
+        _write_truth(times[k], states[k], inputs[0], plant[0], tyres[0], truth[k])
+
+
+class LongitudinalSimulation(Simulation):
+    """One run of a longitudinal scenario.
+
+    Parameters
+    ----------
+    scenario
+        What to run.
+    vehicle
+        The vehicle to run it with.
+    """
+
+    actions: ClassVar[tuple[Action, ...]] = (
+        Action("torque_front", "N m", -_FULL_TORQUE, _FULL_TORQUE, "Torque on the front axle"),
+        Action("torque_rear", "N m", -_FULL_TORQUE, _FULL_TORQUE, "Torque on the rear axle"),
+    )
+    truth_type = TRUTH_TYPE
+
+    def __init__(self, scenario: LongitudinalScenario, vehicle: Vehicle) -> None:
+        self.scenario = scenario
+        paper = scenario.integrator == PAPER_SOLVER
+        self.sample_time = None if paper else scenario.sample_time
+        self._integrator = -1 if paper else integrators.INTEGRATORS[scenario.integrator]
+        self._plant = plant_record(vehicle.values())
+        driver = scenario.driver
+        rear = driver.front if driver.rear is None else driver.rear
+        self._segments = (driver.front, rear, scenario.friction)
+        self._profiles = tuple(segment_records(part) for part in self._segments)
+        self._inputs = np.zeros(1, INPUT_TYPE)
+        self._tyres = np.zeros(1, TYRE_TYPE)
+        self._work = integrators.scratch()
+        self._step = _FIRST_STEP
+        self._start()
+
+    def reset(self, seed: int) -> npt.NDArray[Any]:
+        """Start a run; return its first sample."""
+        if self.sample_time is None:
+            raise GripbenchError(
+                f"{self.scenario.name}: the paper's solver chooses its own steps and cannot be "
+                "advanced sample by sample; set integrator = 'ros3'"
+            )
+        self._start()
+        self._jumps = _jump_stream(seed)
+        self._pending = np.empty((0, 2))
+        truth = np.zeros(1, TRUTH_TYPE)
+        self._set_start_inputs()
+        plant, tyres = self._plant[0], self._tyres[0]
+        evaluate_tyres(self._x, plant, tyres)
+        _write_truth(0.0, self._x, self._inputs[0], plant, tyres, truth[0])
+        return truth
+
+    def drive(self) -> npt.NDArray[np.float64]:
+        """Return the torques of the scenario's profiles for the next interval [N m]."""
+        front, rear, _ = self._profiles
+        middle = (self._k + 0.5) * self.scenario.sample_time
+        return np.array([profile_value(middle, front), profile_value(middle, rear)])
+
+    def advance(self, action: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
+        """Hold the axle torques [N m] for one sample time; return the sample at its end."""
+        sample_time = self.scenario.sample_time
+        front, rear, friction = self._profiles
+        inputs = self._inputs[0]
+        command(self._k, sample_time, front, rear, friction, self.scenario.road_grade, inputs)
+        inputs["torque_front"], inputs["torque_rear"] = action
+        if len(self._pending) == 0:
+            self._pending = self._draw(NOISE_BLOCK)
+        truth = np.zeros(1, TRUTH_TYPE)
+        self._step = advance_one(
+            self._k,
+            sample_time,
+            self._x,
+            self._step,
+            inputs,
+            self._plant[0],
+            self._integrator,
+            self._pending[0],
+            self._tyres[0],
+            self._work,
+            truth[0],
+        )
+        self._pending = self._pending[1:]
+        self._k += 1
+        if not np.isfinite(self._x).all():
+            self.termination = "diverged"
+        return truth
+
+    def run(self, seed: int) -> npt.NDArray[Any]:
+        """Run to the horizon under the torque profiles; return the truth at every sample."""
+        if self.sample_time is None:
+            return self._run_paper_solver()
+        first = self.reset(seed)
+        truth = np.zeros(self.scenario.steps + 1, TRUTH_TYPE)
+        truth[0] = first[0]
+        _run(
+            self.scenario.sample_time,
+            self._x,
+            self._step,
+            self._inputs,
+            self._plant,
+            self._integrator,
+            self._profiles,
+            self._draw(self.scenario.steps),
+            self._tyres,
+            self._work,
+            truth,
+        )
+        finite = np.isfinite(truth["speed_x"])
+        if not finite.all():
+            self.termination = "diverged"
+            truth = truth[: int(finite.argmin())]
+        return truth
+
+    def notes(self) -> dict[str, float]:
+        """Return the time [s] of the first friction step, if there is one."""
+        steps = sorted(piece.start for piece in self.scenario.friction)[1:]
+        return {"friction_step": steps[0]} if steps else {}
+
+    @classmethod
+    def together(cls, simulations: Sequence[LongitudinalSimulation]) -> Lanes:
+        """Return runs that advance in one compiled call."""
+        from gripbench.envs.plants.longitudinal.lanes import LongitudinalLanes
+
+        return LongitudinalLanes(simulations)
+
+    def _start(self) -> None:
+        speed = self.scenario.initial_speed
+        self._x = np.array([speed, *[speed / self._plant["wheel_radius"][0]] * 2])
+        self._step = _FIRST_STEP
+        self._k = 0
+        self.termination = ""
+
+    def _set_start_inputs(self) -> None:
+        """Set the inputs of the first sample: friction and grade, no torque yet."""
+        _, _, friction = self._profiles
+        nothing = friction[:0]
+        set_inputs(self._inputs[0], 0.0, nothing, nothing, friction, self.scenario.road_grade)
+
+    def _draw(self, n: int) -> npt.NDArray[np.float64]:
+        deviation = self.scenario.wheel_speed_noise * np.sqrt(self.scenario.sample_time / 1e-3)
+        if deviation == 0.0:
+            return np.zeros((n, 2))
+        return deviation * self._jumps.standard_normal((n, 2))
+
+    def _run_paper_solver(self) -> npt.NDArray[Any]:
+        self._start()
+        scenario = self.scenario
+        stops = {round(i * STOP_EVERY, 9) for i in range(1, int(scenario.horizon / STOP_EVERY) + 1)}
+        stops |= set().union(*(breakpoints(part) for part in self._segments), {scenario.horizon})
+        ordered = np.array(sorted(t for t in stops if 0.0 < t <= scenario.horizon))
+        capacity = 100_000
+        while True:
+            times, states = np.empty(capacity), np.empty((capacity, 3))
+            count = paper_solver(
+                self._x, ordered, self._inputs, self._plant, *self._profiles,
+                scenario.road_grade, times, states,
+            )  # fmt: skip
+            if count >= 0:
+                break
+            capacity *= 2
+        truth = np.zeros(count, TRUTH_TYPE)
+        _sampled_truth(
+            times[:count],
+            states[:count],
+            self._inputs,
+            self._plant,
+            self._profiles,
+            scenario.road_grade,
+            self._tyres,
+            truth,
+        )
+        return truth
+
+
+def _jump_stream(seed: int) -> np.random.Generator:
+    """Return the stream of the process noise: one of its own, apart from the sensors'."""
+    return np.random.default_rng(np.random.SeedSequence([seed, 0x57484545]))

@@ -1,0 +1,1 @@
+"""Roads and the paths on them."""
