@@ -5,7 +5,7 @@ import os
 from hypothesis import settings
 
 # An example that compiles a kernel, or a busy machine, says nothing about the property. The same
-# examples every time, so that a change is judged and not the draw; GRIPBENCH_FRESH=1 draws new ones.
+# examples every time: a change is judged, not the draw. GRIPBENCH_FRESH=1 draws new ones.
 settings.register_profile(
     "gripbench",
     deadline=None,
