@@ -5,15 +5,19 @@ road grade lowers the nose (downhill) and a positive yaw rate turns left. SI uni
 throughout.
 
 A signal has one name wherever it occurs: in the truth of a recording, in the observations that
-a sensor gives of it, and in the estimates of a method.
+a sensor gives of it, and in the estimates of a method. It has one unit in which people see it, in
+tables, pictures and pages alike: degrees for angles, degrees a second for the body's rates.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from gripbench.errors import unknown
 
@@ -59,6 +63,38 @@ class Signal:
     def idealised(self) -> bool:
         """Whether no sensor in a vehicle gives this channel."""
         return self.instrument == IDEALISED
+
+    @property
+    def angle(self) -> bool:
+        """Whether values that differ by whole turns mean the same: a plane angle [rad]."""
+        return self.unit == "rad"
+
+    @property
+    def display_unit(self) -> str:
+        """Unit in which people see the signal, `-` where there is none."""
+        return self._display[0]
+
+    @property
+    def display_factor(self) -> float:
+        """Factor from the SI value to the one that people see."""
+        return self._display[1]
+
+    @property
+    def _display(self) -> tuple[str, float]:
+        if self.frame == "wheel" and not self.angle:
+            return self.unit, 1.0  # a wheel turns many times a second
+        return _DISPLAY.get(self.unit, (self.unit, 1.0))
+
+
+_DEGREES = 180.0 / math.pi
+
+_DISPLAY = {
+    "rad": ("deg", _DEGREES),
+    "rad/s": ("deg/s", _DEGREES),
+    "(rad)^2": ("deg^2", _DEGREES**2),
+    "(rad/s)^2": ("(deg/s)^2", _DEGREES**2),
+}
+"""Display unit and factor by SI unit, for those that are not shown as they are."""
 
 
 IDEALISED = "idealised"
@@ -257,6 +293,32 @@ def signal(name: str) -> Signal:
             name, "-", "-", "1: new sample, 0: held", parent.instrument, f"{parent.name} is new"
         )
     raise unknown("signal", name, SIGNALS)
+
+
+Angle = TypeVar("Angle", float, npt.NDArray[np.float64])
+
+
+def wrapped(angle: Angle) -> Angle:
+    """Return an angle [rad] within -pi to pi, any shape; what lies there already keeps its bits.
+
+    Examples
+    --------
+    >>> float(wrapped(0.5)), bool(abs(wrapped(0.5 + 4.0 * math.pi) - 0.5) < 1e-14)
+    (0.5, True)
+    """
+    turns = np.round(angle / (2.0 * math.pi))
+    return angle - 2.0 * math.pi * turns
+
+
+def difference(name: str, value: Angle, other: Angle) -> Angle:
+    """Return `value - other` of a signal, any shape: of an angle the shorter way round.
+
+    Raises
+    ------
+    InputError
+        If no such signal exists.
+    """
+    return wrapped(value - other) if signal(name).angle else value - other
 
 
 def record_type(names: Iterable[str]) -> np.dtype:

@@ -36,7 +36,7 @@ def test_angles_are_shown_in_degrees():
     text = text_of(rows_of("sideslip", ("one",)))
     assert "sideslip [deg]" in text
     assert f"{np.degrees(0.01):.3f}" in text
-    assert "yaw_rate [rad/s]" in text_of(rows_of("yaw_rate", ("one",)))
+    assert "yaw_rate [deg/s]" in text_of(rows_of("yaw_rate", ("one",)))
 
 
 @pytest.mark.parametrize("width", [100, 120])

@@ -1,9 +1,18 @@
 """The signal table."""
 
+import math
+
 import numpy as np
 import pytest
 
-from gripbench.envs.signals import IDEALISED, SIGNALS, record_type, signal
+from gripbench.envs.signals import (
+    IDEALISED,
+    SIGNALS,
+    difference,
+    record_type,
+    signal,
+    wrapped,
+)
 from gripbench.errors import InputError
 
 
@@ -43,3 +52,40 @@ def test_record_type():
     assert all(kind[name] == np.float64 for name in kind.names)
     with pytest.raises(InputError):
         record_type(("time", "nothing_like_it"))
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "factor"),
+    [
+        ("sideslip", "deg", 180.0 / math.pi),
+        ("slip_angle_front_left", "deg", 180.0 / math.pi),
+        ("yaw_rate", "deg/s", 180.0 / math.pi),
+        ("sideslip_variance", "deg^2", (180.0 / math.pi) ** 2),
+        ("wheel_speed_front", "rad/s", 1.0),
+        ("cornering_stiffness_front", "N/rad", 1.0),
+        ("mu", "-", 1.0),
+    ],
+)
+def test_each_signal_has_one_unit_that_people_see(name, unit, factor):
+    shown = signal(name)
+    assert (shown.display_unit, shown.display_factor) == (unit, factor)
+
+
+def test_what_turns_is_an_angle_and_what_does_not_is_none():
+    for name in ("yaw", "course", "roll", "road_grade", "steer_angle", "slip_angle_rear_left"):
+        assert signal(name).angle, name
+    for name in ("yaw_rate", "slip_ratio_front", "cornering_stiffness_front", "yaw_variance"):
+        assert not signal(name).angle, name
+
+
+def test_a_wrap_keeps_the_bits_of_what_lies_within_and_takes_off_whole_turns():
+    angles = np.random.default_rng(0).uniform(-math.pi, math.pi, 1000)
+    assert np.array_equal(wrapped(angles), angles)
+    for turns in (-3, -1, 1, 7):
+        assert np.abs(wrapped(angles + turns * 2.0 * math.pi) - angles).max() < 1e-13
+    assert np.isnan(wrapped(float("nan")))
+
+
+def test_the_difference_of_an_angle_is_the_shorter_way_round():
+    assert difference("yaw", 3.1, -3.1) == pytest.approx(6.2 - 2.0 * math.pi)
+    assert difference("yaw_rate", 3.1, -3.1) == pytest.approx(6.2)

@@ -51,15 +51,6 @@ def significant(value: float, digits: int = 3) -> str:
     return f"{value:.{places}f}" if places <= 6 else f"{value:.{digits - 1}e}"
 
 
-DEGREES = 180.0 / math.pi
-
-
-def shown_unit(target: str) -> tuple[float, str]:
-    """Return factor and unit in which tables show a signal: angles in degrees, others in SI."""
-    unit = signal(target).unit
-    return (DEGREES, "deg") if unit == "rad" else (1.0, unit)
-
-
 def bounded(value: float, low: float, high: float, factor: float = 1.0) -> str:
     """Return a figure with its interval where it has one.
 
@@ -109,7 +100,7 @@ def rms_tables(summary: pd.DataFrame, width: int) -> list[tuple[str, Table]]:
         target = str(key)
         if not target:
             continue
-        factor, unit = shown_unit(target)
+        factor, unit = signal(target).display_factor, signal(target).display_unit
         runs = int(part["runs"].max())
         heading = f"{target} [{unit}]: RMS error, pooled over {runs} runs, 95 % interval"
         responds = bool((part["excited"].fillna(0) > 0).any())

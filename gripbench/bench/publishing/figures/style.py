@@ -171,17 +171,11 @@ SYMBOLS: Mapping[str, str] = {
 }
 """What an axis calls a signal; others go by their name."""
 
-DEGREES = 180.0 / np.pi
-
 
 def axis_scale(name: str) -> tuple[float, str]:
-    """Return factor and unit in which pictures show a signal: angles in degrees, others in SI."""
-    unit = signal(name).unit
-    if unit == "rad":
-        return DEGREES, "°"
-    if unit == "rad/s" and not name.startswith("wheel_speed"):
-        return DEGREES, "°/s"
-    return 1.0, unit
+    """Return factor and unit in which pictures show a signal, degrees as their sign."""
+    shown = signal(name)
+    return shown.display_factor, shown.display_unit.replace("deg", "°")
 
 
 def axis_label(name: str) -> str:
