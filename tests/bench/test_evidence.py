@@ -3,7 +3,7 @@
 import pytest
 
 from gripbench.bench.papers.li2014 import evidence as li2014
-from gripbench.bench.papers.tables import load_paper_tables
+from gripbench.bench.papers.li2014.tables import load_paper_tables
 
 
 @pytest.fixture(scope="module")

@@ -1,22 +1,32 @@
-"""The lateral papers run again on a few of their test seeds keep every verdict."""
+"""The lateral papers run again on a few of their test seeds: verdicts, and figures of our own."""
+
+import math
+import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from gripbench.bench.papers.anderson2004 import reproduction as anderson2004
-from gripbench.bench.papers.claims import changed_verdicts, load_paper
 from gripbench.bench.papers.dakhlallah2008 import reproduction as dakhlallah2008
 from gripbench.envs.worlds import load_scenario, record
 
+BOUNDS = tomllib.loads((Path(__file__).parent / "own_figures.toml").read_text())
+
+
+def within(value, low=-math.inf, high=math.inf, outside=False):
+    return (low <= value <= high) != outside
+
 
 @pytest.mark.parametrize("module", [anderson2004, dakhlallah2008])
-def test_every_claim_keeps_its_verdict(module):
+def test_every_claim_keeps_its_verdict_and_every_figure_its_bounds(module):
     calls = []
-    claims = module.reproduce(lambda done, total: calls.append((done, total)), seeds=[0, 1, 2])
-    paper = load_paper(module.NAME)
-    assert [claim.item for claim in claims] == [claim.item for claim in paper.claims]
-    assert changed_verdicts(paper, claims) == []
+    result = module.reproduce(lambda done, total: calls.append((done, total)), seeds=[0, 1, 2])
+    assert result.changed == []
     assert calls[-1][0] == calls[-1][1]
+    values = {figure.item: figure.value for figure in result.figures}
+    for item, bounds in BOUNDS[module.NAME].items():
+        assert within(values[item], **bounds), (item, values[item], bounds)
 
 
 def test_the_gyroscopes_scale_changes_nothing_else():

@@ -8,9 +8,8 @@ from typer.testing import CliRunner
 
 from gripbench.bench import command_line
 from gripbench.bench.command_line import application
-from gripbench.bench.papers import comparison as paper_comparison
-from gripbench.bench.papers import tables as paper_tables
-from gripbench.bench.papers.tables import Cell, Outcome, load_paper_tables, reproduce
+from gripbench.bench.papers.li2014 import tables as paper_tables
+from gripbench.bench.papers.li2014.tables import Cell, Outcome, load_paper_tables, reproduce
 from gripbench.configuration import parse, read_toml
 from gripbench.errors import InputError
 
@@ -207,7 +206,6 @@ def test_a_file_with_a_mistake_writes_nothing(monkeypatch, capsys, tmp_path):
     source = paper_tables.paper_path("li2014").read_text()
     broken = tmp_path / "li2014.toml"
     broken.write_text(source.replace("tolerance = 1.15", "tolerance = 0.5"))
-    monkeypatch.setattr(paper_comparison, "paper_files", lambda: {"li2014": broken})
     monkeypatch.setattr(paper_tables, "paper_path", lambda name: broken)
     out = tmp_path / "out"
     code, err = _main(monkeypatch, capsys, "reproduce", "li2014", "--results", str(out))

@@ -41,21 +41,22 @@ def test_friction_measures_without_excitation_are_not_numbers():
     assert np.isnan(friction_error_and_delay(run, run["mu"])).all()
 
 
-def test_every_claim_has_its_figure_and_one_seed_shows_the_order():
+def test_every_item_has_its_figure_and_one_seed_shows_the_order():
     paper = load_paper("yoon2015")
     steps = []
-    claims = {
-        claim.item: claim
-        for claim in yoon2015.reproduce(lambda done, total: steps.append((done, total)), seeds=[4])
-    }
+    result = yoon2015.reproduce(lambda done, total: steps.append((done, total)), seeds=[4])
     assert steps[-1] == (10, 10)
-    assert set(claims) == {claim.item for claim in paper.claims}
-    ours = {item: claim.ours for item, claim in claims.items()}
+    assert [claim.item for claim in result.claims] == [claim.item for claim in paper.claims]
+    assert [figure.item for figure in result.figures] == [entry.item for entry in paper.figures]
+    ours = {claim.item: claim.ours for claim in result.claims}
+    ours |= {figure.item: figure.value for figure in result.figures}
     assert ours["track_sideslip"] < 1.3
     assert ours["track_sideslip"] < ours["track_no_delay_handling"]
     assert ours["track_sideslip"] < ours["track_no_bias_states"]
     assert ours["track_sideslip"] < ours["track_sideslip_as_printed"]
     assert ours["public_sideslip_pitch_aware"] < ours["public_sideslip_table_1"]
+    assert ours["passing_with_rejection"] < ours["passing_no_rejection"]
     assert ours["single_delay_diverged"] == 1.0
     assert ours["separability"] < 1e-6
     assert ours["printed_12_angle"] > 45.0
+    assert abs(ours["identified_mu"]) < 0.15

@@ -22,7 +22,7 @@ def evidence(
 ) -> None:
     """Run a reproduction again with one thing done otherwise at a time, and print what changes."""
     from gripbench.bench.papers.li2014 import evidence as li2014
-    from gripbench.bench.papers.tables import load_paper_tables
+    from gripbench.bench.papers.li2014.tables import load_paper_tables
     from gripbench.bench.publishing import tables
     from gripbench.bench.publishing.presentation import progress
     from gripbench.errors import unknown

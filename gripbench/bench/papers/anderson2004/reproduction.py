@@ -7,6 +7,7 @@ Errors are sideslip RMS where the vehicle turns by more than 1 degree a second, 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
 from math import degrees, radians, sqrt
@@ -15,7 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from gripbench.bench.papers.anderson2004.riccati import RATES, SteadyState, poles, steady_state
-from gripbench.bench.papers.claims import Claim, Paper, judge, load_paper
+from gripbench.bench.papers.claims import Paper, load_paper
+from gripbench.bench.papers.reproduction import Progress, Reproduction, of_claims
 from gripbench.bench.papers.sideslip import (
     pooled_rms,
     sideslip_error,
@@ -47,11 +49,15 @@ ANOTHER_VEHICLE = {
 }
 """Parameters of a heavier vehicle with the same wheelbase (Figure 6 names no vehicle)."""
 
-Progress = Callable[[int, int], None]
 Vehicle = Mapping[str, float]
 
 
-def reproduce(progress: Progress | None = None, seeds: Sequence[int] | None = None) -> list[Claim]:
+def load() -> Paper:
+    """Return the paper's file."""
+    return load_paper(NAME)
+
+
+def reproduce(progress: Progress | None = None, seeds: Sequence[int] | None = None) -> Reproduction:
     """Return every claim of the paper with our figure.
 
     Parameters
@@ -61,7 +67,7 @@ def reproduce(progress: Progress | None = None, seeds: Sequence[int] | None = No
     seeds
         Seeds of the runs; by default the test seeds of the paper's file.
     """
-    paper = load_paper(NAME)
+    paper = load()
     chosen = list(paper.seeds.test) if seeds is None else list(seeds)
     vehicle = load_vehicle("anderson2004_blazer").values()
     tuning = [record(load_scenario("two_turns"), seed) for seed in paper.seeds.tuning[:2]]
@@ -80,7 +86,7 @@ def reproduce(progress: Progress | None = None, seeds: Sequence[int] | None = No
         figures |= part()
     if progress:
         progress(len(parts), len(parts))
-    return judge(paper, figures)
+    return of_claims(paper, figures)
 
 
 def table_1(paper: Paper, vehicle: Vehicle) -> dict[str, float]:
@@ -178,6 +184,13 @@ def level_turns(seeds: Sequence[int], identified: Vehicle) -> dict[str, float]:
         "section_4.stiffer": sideslip_rms(model, _stiffer(identified, 1.2, 1.2), clean),
         "section_5.updated": sideslip_rms(updated, another, scaled),
     }
+    for item, over, under in (
+        ("figure_5.growth", "figure_5.scale_factor", "figure_5.clean"),
+        ("figure_6.growth", "figure_6.clean", "figure_7.clean"),
+        ("figure_7.share", "figure_7.scale_factor", "figure_5.scale_factor"),
+        ("section_5.share", "section_5.updated", "figure_6.scale_factor"),
+    ):
+        figures[item] = figures[over] / figures[under]
     figures["figure_3.growth"], figures["figure_3.share"] = _covariances(identified, clean[0])
     cases: dict[str, tuple[CompiledMethod, Vehicle, list[Recording]]] = {
         "correct": (model, identified, clean),
@@ -186,8 +199,9 @@ def level_turns(seeds: Sequence[int], identified: Vehicle) -> dict[str, float]:
         "updated": (updated, another, scaled),
     }
     for name, case in cases.items():
-        memory, power = course_residuals(*case)
-        figures[f"residuals.{name}.memory"], figures[f"residuals.{name}.power"] = memory, power
+        residuals = course_residuals(*case)
+        figures[f"residuals.{name}.memory"] = residuals.memory
+        figures[f"residuals.{name}.power"] = residuals.power
     figures["errata.eq8_covariance"] = _printed_over_actual(identified, clean[0])
     return figures
 
@@ -200,11 +214,13 @@ def banked_turn(seeds: Sequence[int], identified: Vehicle) -> dict[str, float]:
     model, informed = ModelBasedKalmanFilter(), ModelBasedKalmanFilter("bank")
     errors = [sideslip_error(model, identified, run)[steady(run)] for run in runs]
     steer = [np.mean(np.abs(run.truth["steer_angle"][steady(run)])) for run in (level, runs[0])]
+    unknown, known = (sideslip_rms(method, identified, runs) for method in (model, informed))
     return {
         "figure_2.bank_steer": degrees(float(steer[0] - steer[1])),
         "figure_10.unknown_bank": float(np.mean(np.concatenate(errors))),
-        "figure_10.known_bank": sideslip_rms(informed, identified, runs),
-        "figure_10.over_integration": sideslip_rms(model, identified, runs)
+        "figure_10.known_bank": known,
+        "figure_10.known_share": known / unknown,
+        "figure_10.over_integration": unknown
         / pooled_rms([_integrated_accelerometer(run) for run in runs]),
     }
 
@@ -217,10 +233,12 @@ def cornering_test(seeds: Sequence[int], identified: Vehicle) -> dict[str, float
     after = course_residuals(updated, identified, runs)
     return {
         "figure_8.sideslip": sideslip_rms(model, identified, runs),
-        "figure_9.memory": before[0],
+        "figure_9.memory": before.memory,
+        "figure_9.whiteness": before.memory / before.band,
         "figure_12.sideslip": sideslip_rms(updated, identified, runs),
-        "figure_13.memory": after[0],
-        "figure_13.power_ratio": after[1] / before[1],
+        "figure_13.memory": after.memory,
+        "figure_13.whiteness": after.memory / after.band,
+        "figure_13.power_ratio": after.power / before.power,
     }
 
 
@@ -246,22 +264,39 @@ def identify(runs: Sequence[Recording]) -> dict[str, float]:
     return vehicle
 
 
+@dataclass(frozen=True)
+class CourseResiduals:
+    """GPS residuals over several runs.
+
+    Attributes
+    ----------
+    memory, power
+        Lag-1 autocorrelation and mean normalised square, means over the runs; a right model has 0
+        and 1.
+    band
+        Half width of the 95 % band of the autocorrelation of one run's white residuals.
+    """
+
+    memory: float
+    power: float
+    band: float
+
+
 def course_residuals(
     method: CompiledMethod, vehicle: Vehicle, runs: Sequence[Recording]
-) -> tuple[float, float]:
-    """Return lag-1 autocorrelation and mean normalised square of the GPS residuals.
-
-    Both are means over the runs, from 5 s on; a right model has 0 and 1.
-    """
-    memory, power = [], []
+) -> CourseResiduals:
+    """Return what the GPS residuals from 5 s on say of the model."""
+    memory, power, band = [], [], []
     for run in runs:
         estimates = method.run(vehicle, run.observations)
         taken = (run.observations["course_new"] > 0.0) & (run.observations["time"] > 5.0)
         residual = estimates["course_innovation"][taken]
         variance = estimates["course_innovation_variance"][taken]
         power.append(float(normalised_squares(residual, variance).mean()))
-        memory.append(float(whiteness_test(residual / np.sqrt(variance)).autocorrelation[0]))
-    return float(np.mean(memory)), float(np.mean(power))
+        test = whiteness_test(residual / np.sqrt(variance))
+        memory.append(float(test.autocorrelation[0]))
+        band.append(test.band)
+    return CourseResiduals(*(float(np.mean(part)) for part in (memory, power, band)))
 
 
 def with_gyro_scale(scenario: Scenario, scale: float = SCALE) -> Scenario:

@@ -7,12 +7,13 @@ and one at the limit, which tell more: in the mild one the model alone does as w
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
 
-from gripbench.bench.papers.claims import Claim, judge, load_paper
+from gripbench.bench.papers.claims import Paper, load_paper
+from gripbench.bench.papers.reproduction import Progress, Reproduction, of_claims
 from gripbench.bench.papers.sideslip import pooled_rms
 from gripbench.bench.scoring.observability import dugoff_observability
 from gripbench.envs.recordings import Recording
@@ -22,8 +23,11 @@ from gripbench.methods.dugoff_ekf import DugoffEkf
 
 NAME = "dakhlallah2008"
 DRIVES = ("mild", "hard", "limit")
+AVAILABLE = 0.8
+"""Friction coefficient of the road."""
+
 ASSUMED = 0.5
-"""Friction coefficient that the sweep assumes on a road of 0.8."""
+"""Friction coefficient that the sweep assumes on that road."""
 
 VARIANTS = (
     "paper_step",
@@ -35,10 +39,13 @@ VARIANTS = (
 )
 WHEELS = ("front_left", "front_right", "rear_left", "rear_right")
 
-Progress = Callable[[int, int], None]
+
+def load() -> Paper:
+    """Return the paper's file."""
+    return load_paper(NAME)
 
 
-def reproduce(progress: Progress | None = None, seeds: Sequence[int] | None = None) -> list[Claim]:
+def reproduce(progress: Progress | None = None, seeds: Sequence[int] | None = None) -> Reproduction:
     """Return every claim of the paper with our figure.
 
     Parameters
@@ -48,7 +55,7 @@ def reproduce(progress: Progress | None = None, seeds: Sequence[int] | None = No
     seeds
         Seeds of the runs; by default the test seeds of the paper's file.
     """
-    paper = load_paper(NAME)
+    paper = load()
     chosen = list(paper.seeds.test) if seeds is None else list(seeds)
     figures: dict[str, float] = {}
     for done, drive in enumerate(DRIVES):
@@ -57,7 +64,8 @@ def reproduce(progress: Progress | None = None, seeds: Sequence[int] | None = No
         figures |= drive_figures(drive, chosen)
     if progress:
         progress(len(DRIVES), len(DRIVES))
-    return judge(paper, figures)
+    figures["mild.used_share"] = figures["mild.largest_used_friction"] / AVAILABLE
+    return of_claims(paper, figures)
 
 
 def drive_figures(drive: str, seeds: Sequence[int]) -> dict[str, float]:

@@ -15,9 +15,9 @@ import numpy as np
 import numpy.typing as npt
 
 from gripbench.bench.catalogue.registry import built_in_methods
-from gripbench.bench.papers import tables as paper_tables
 from gripbench.bench.papers.li2014 import evidence_figures as figures
-from gripbench.bench.papers.tables import MethodColumn, Outcome, RecordingMethod
+from gripbench.bench.papers.li2014 import tables as paper_tables
+from gripbench.bench.papers.li2014.tables import MethodColumn, Outcome, RecordingMethod
 from gripbench.bench.publishing import tables
 from gripbench.envs.instruments.sensors import SensorSuite
 from gripbench.envs.plants.longitudinal.world import LongitudinalScenario, LongitudinalSimulation
@@ -298,6 +298,14 @@ def changes(seeds: int) -> tuple[Change, ...]:
         Change(
             "open cell", "gradient, friction", "as reproduced",
             figure=lambda _: figures.early_error(_named("li2014_gradient", 0)),
+        ),
+        *(
+            Change(
+                "open cell", "velocity gain of the observer", f"K_a {gain:.2g}",
+                chooser=_with(observer, "", False, velocity_gain=gain),
+                figure=_ratios,
+            )
+            for gain in (6e5, 8e5, 1.1e6, 1.2e6, 1.5e6)
         ),
         Change(
             "open cell", "gains of the observer", "K_a 1.5e6, K_e 5e4",

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gripbench.bench.papers.figures import PaperFigure
-from gripbench.bench.papers.tables import PaperTables, load_paper_tables
+from gripbench.bench.papers.li2014.tables import PaperTables, load_paper_tables
 from gripbench.bench.publishing.figures.runs import Runs
 from gripbench.bench.publishing.figures.style import (
     TRUTH,

@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gripbench.bench.papers.claims import Claim, judge, load_paper
+from gripbench.bench.papers.claims import Paper, load_paper
+from gripbench.bench.papers.reproduction import Progress, Reproduction, of_claims
 from gripbench.bench.papers.yoon2015.brush_identification import (
     PARAMETERS,
     identify,
@@ -30,6 +31,8 @@ from gripbench.envs.vehicles import GRAVITY
 from gripbench.envs.worlds import load_scenario, record
 from gripbench.methods.heading_ekf import field_in_vehicle
 from gripbench.methods.magnetometer_gps_cascade import MagnetometerGpsCascade
+
+NAME = "yoon2015"
 
 Array = npt.NDArray[np.float64]
 
@@ -124,10 +127,12 @@ class _Collected:
         return float(np.degrees(self.rms(name)))
 
 
-Progress = Callable[[int, int], None]
+def load() -> Paper:
+    """Return the paper's file."""
+    return load_paper(NAME)
 
 
-def reproduce(progress: Progress | None = None, seeds: Sequence[int] | None = None) -> list[Claim]:
+def reproduce(progress: Progress | None = None, seeds: Sequence[int] | None = None) -> Reproduction:
     """Run the paper's comparison and set our figures beside its claims.
 
     Parameters
@@ -137,8 +142,11 @@ def reproduce(progress: Progress | None = None, seeds: Sequence[int] | None = No
     seeds
         Seeds to run; None: the test seeds of the paper's file.
     """
-    paper = load_paper("yoon2015")
-    return judge(paper, figures(paper.seeds.test if seeds is None else seeds, progress))
+    paper = load()
+    found = figures(paper.seeds.test if seeds is None else seeds, progress)
+    found["public_over_track"] = found["public_sideslip"] / found["track_sideslip"]
+    found["pitch_share"] = found["public_sideslip_pitch_aware"] / found["public_sideslip"]
+    return of_claims(paper, found)
 
 
 def figures(seeds: Sequence[int], progress: Progress | None = None) -> dict[str, float]:
@@ -300,7 +308,7 @@ def _jump(recordings: Iterator[Recording]) -> dict[str, float]:
 
 def _identification() -> dict[str, float]:
     """Identify the tyre on snow from the tuning seeds: that is calibration, not a test."""
-    seeds = load_paper("yoon2015").seeds.tuning
+    seeds = load().seeds.tuning
     recordings = [
         record(_scenario(name), seed)
         for name in ("double_lane_change_snow", "slalom_snow")
@@ -316,7 +324,7 @@ def _identification() -> dict[str, float]:
         for name in PARAMETERS
     }
     slips = np.concatenate([test.slip_front for test in tests])
-    load = 0.25 * vehicle["mass"] * GRAVITY
+    wheel_load = 0.25 * vehicle["mass"] * GRAVITY
     found["identified_residual"] = tyre.residual_rms
-    found["separability"] = separability(slips, true["mu"], load, 3e6, 0.09)[0]
+    found["separability"] = separability(slips, true["mu"], wheel_load, 3e6, 0.09)[0]
     return found
