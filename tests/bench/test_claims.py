@@ -86,7 +86,7 @@ def test_a_sentence_holds_or_does_not_and_kinds_are_counted_apart():
     assert [entry.verdict for entry in claims] == ["no worse", "does not hold", "not comparable"]
     assert counts(claims) == [
         "2 printed numbers: 1 no worse, 1 not comparable.",
-        "1 sentences: 1 does not hold.",
+        "1 sentence: 1 does not hold.",
     ]
 
 

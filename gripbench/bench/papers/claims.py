@@ -290,9 +290,9 @@ def changed_verdicts(paper: Paper, claims: Sequence[Claim]) -> list[str]:
 
 
 _KINDS: dict[Behind, str] = {
-    "printed": "printed numbers",
-    "figure": "numbers read off figures",
-    "sentence": "sentences",
+    "printed": "printed number(s)",
+    "figure": "number(s) read off figures",
+    "sentence": "sentence(s)",
 }
 
 
@@ -303,5 +303,6 @@ def counts(claims: Sequence[Claim]) -> list[str]:
         verdicts = [claim.verdict for claim in claims if claim.behind == behind]
         if verdicts:
             parts = [f"{verdicts.count(name)} {name}" for name in dict.fromkeys(verdicts)]
-            lines.append(f"{len(verdicts)} {kind}: {', '.join(parts)}.")
+            named = kind.replace("(s)", "" if len(verdicts) == 1 else "s")
+            lines.append(f"{len(verdicts)} {named}: {', '.join(parts)}.")
     return lines
