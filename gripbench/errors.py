@@ -1,13 +1,54 @@
-"""The errors that gripbench raises on purpose; the command line prints them as one line."""
+"""The errors that gripbench raises on purpose, each one line, whatever words it was made of."""
 
 from __future__ import annotations
 
 import difflib
+import unicodedata
 from collections.abc import Iterable
+
+LONGEST = 500
+"""Most characters that a text from outside keeps: a reason, a title."""
+
+
+def one_line(text: str, longest: int = 0) -> str:
+    r"""Return a text that any file, table and terminal can take, on one line.
+
+    Control characters, line breaks, lone surrogates and what changes the direction of a line are
+    escaped, so that no name or message from outside breaks a line or cannot be written.
+
+    Parameters
+    ----------
+    text
+        Any text.
+    longest
+        Most characters of it that are kept; 0: all.
+
+    Examples
+    --------
+    >>> one_line("two\nlines and \udc80")
+    'two\\nlines and \\udc80'
+    >>> one_line("12345678", longest=5)
+    '1234…'
+    """
+    kept = text[: longest + 1] if longest else text
+    if not (kept.isascii() and kept.isprintable()):
+        kept = "".join(letter if _plain(letter) else _escaped(letter) for letter in kept)
+    return kept[: longest - 1] + "…" if longest and len(kept) > longest else kept
+
+
+def _plain(letter: str) -> bool:
+    return letter.isprintable() or unicodedata.category(letter) == "Zs"
+
+
+def _escaped(letter: str) -> str:
+    return letter.encode("unicode_escape", "surrogatepass").decode("ascii")
 
 
 class GripbenchError(Exception):
-    """Base of all errors that a user can mend."""
+    """Base of all errors that a user can mend; its message is one line."""
+
+    def __init__(self, *arguments: object) -> None:
+        super().__init__(*(one_line(str(item)) for item in arguments))
 
 
 class InputError(GripbenchError):

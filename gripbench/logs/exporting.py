@@ -15,6 +15,7 @@ from gripbench.envs.signals import NEW, signal
 from gripbench.errors import InputError
 from gripbench.logs.channel_map import ChannelMap
 from gripbench.logs.readers import optional
+from gripbench.writing import being_written
 
 _TRUTH = "truth_"
 
@@ -40,20 +41,30 @@ def export_recording(recording: Recording, path: Path) -> ChannelMap:
     """
     columns = _columns(recording)
     suffix = path.suffix.lower()
-    if suffix == ".csv":
-        pd.DataFrame(columns).to_csv(path, index=False)  # shortest digits that read back the same
-    elif suffix == ".parquet":
-        pd.DataFrame(columns).to_parquet(path, index=False)
-    elif suffix == ".mat":
-        savemat(path, columns, oned_as="column", do_compression=True, long_field_names=True)
-    elif suffix == ".mf4":
-        _write_mdf(columns, path)
-    else:
-        raise InputError(f"{path}: unknown format '{suffix}': known are .csv, .mat, .mf4, .parquet")
+    if suffix not in _WRITERS:
+        known = ", ".join(_WRITERS)
+        raise InputError(f"{path}: unknown format '{suffix}': known are {known}")
+    with being_written(path) as temporary:
+        _WRITERS[suffix](columns, temporary)
     return _map_of(recording, columns)
 
 
-def _columns(recording: Recording) -> dict[str, npt.NDArray[np.float64]]:
+Columns = dict[str, npt.NDArray[np.float64]]
+
+
+def _write_csv(columns: Columns, path: Path) -> None:
+    pd.DataFrame(columns).to_csv(path, index=False)  # shortest digits that read back the same
+
+
+def _write_parquet(columns: Columns, path: Path) -> None:
+    pd.DataFrame(columns).to_parquet(path, index=False)
+
+
+def _write_mat(columns: Columns, path: Path) -> None:
+    savemat(path, columns, oned_as="column", do_compression=True, long_field_names=True)
+
+
+def _columns(recording: Recording) -> Columns:
     seen = recording.observations
     names = seen.dtype.names or ()
     columns = {name: np.ascontiguousarray(seen[name]) for name in names}
@@ -63,7 +74,7 @@ def _columns(recording: Recording) -> dict[str, npt.NDArray[np.float64]]:
     return columns
 
 
-def _write_mdf(columns: dict[str, npt.NDArray[np.float64]], path: Path) -> None:
+def _write_mdf(columns: Columns, path: Path) -> None:
     asammdf = optional("asammdf", "an MDF4 file")
     times = columns["time"]
     mdf: Any = asammdf.MDF(version="4.10")
@@ -80,6 +91,15 @@ def _write_mdf(columns: dict[str, npt.NDArray[np.float64]], path: Path) -> None:
         mdf.save(path, overwrite=True)
     finally:
         mdf.close()
+
+
+_WRITERS = {
+    ".csv": _write_csv,
+    ".mat": _write_mat,
+    ".mf4": _write_mdf,
+    ".parquet": _write_parquet,
+}
+"""Writers by suffix: columns and a path in, a file out."""
 
 
 def _map_of(recording: Recording, columns: dict[str, npt.NDArray[np.float64]]) -> ChannelMap:

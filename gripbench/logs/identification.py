@@ -24,6 +24,7 @@ from gripbench.envs.recordings import Recording
 from gripbench.envs.vehicles import GRAVITY, Value, Vehicle
 from gripbench.errors import InputError
 from gripbench.logs.derivation import slope
+from gripbench.writing import write_atomically
 
 CORRELATION = 0.2
 """Time [s] over which residuals are taken for correlated."""
@@ -240,7 +241,7 @@ def write_vehicle(vehicle: Vehicle, path: Path) -> None:
         lines.append(
             f"{name} = {{ value = {given.value!r}, source = {text(given.source)}{guess} }}"
         )
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write_atomically(path, "\n".join(lines) + "\n")
 
 
 @dataclass(frozen=True)

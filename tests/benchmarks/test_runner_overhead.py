@@ -46,19 +46,19 @@ def test_runner_overhead_on_the_longitudinal_suite(benchmark, plan, tmp_path, mo
     whole = time.process_time() - began
     overhead = (whole - spent[0]) / spent[0]
     benchmark.extra_info["overhead"] = overhead
-    benchmark.extra_info["cell_ms"] = 1e3 * spent[0] / plan.cells
+    benchmark.extra_info["cell_ms"] = 1e3 * spent[0] / plan.size
     print(
-        f"\n{plan.cells} cells: {1e3 * spent[0] / plan.cells:.2f} ms of work a cell, "
-        f"{1e3 * (whole - spent[0]) / plan.cells:.2f} ms of runner, {100 * overhead:.1f} %"
+        f"\n{plan.size} cells: {1e3 * spent[0] / plan.size:.2f} ms of work a cell, "
+        f"{1e3 * (whole - spent[0]) / plan.size:.2f} ms of runner, {100 * overhead:.1f} %"
     )
-    assert report.computed == plan.cells
+    assert report.computed == plan.size
     assert overhead > 0.0
 
 
 def test_a_warm_run_of_the_longitudinal_suite(benchmark, plan, tmp_path):
     run_plan(plan, Store(tmp_path), Backend(workers=1))
     report = benchmark(run_plan, plan, Store(tmp_path), Backend(workers=1))
-    assert (report.computed, report.stored) == (0, plan.cells)
+    assert (report.computed, report.stored) == (0, plan.size)
 
 
 @pytest.mark.skipif(SEEDS < 2, reason="says nothing with one seed: set GRIPBENCH_SEEDS")
@@ -74,12 +74,12 @@ def test_two_workers_against_one(plan, tmp_path):
             before = _cpu_time()
             store = Store(tmp_path / f"{turn}_{workers}")
             report = run_plan(plan, store, Backend(workers=workers))
-            assert report.computed == plan.cells
+            assert report.computed == plan.size
             if turn:  # the first one compiles
                 wall[workers] = min(wall[workers], report.seconds)
                 spent[workers] = min(spent[workers], _cpu_time() - before)
     print(
-        f"\n{plan.cells} cells: one worker {wall[1]:.2f} s, CPU {spent[1]:.2f} s; "
+        f"\n{plan.size} cells: one worker {wall[1]:.2f} s, CPU {spent[1]:.2f} s; "
         f"two workers {wall[2]:.2f} s, CPU {spent[2]:.2f} s; "
         f"load of the machine {os.getloadavg()[0]:.1f}"
     )

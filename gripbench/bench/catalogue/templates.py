@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from gripbench.bench.running.store import write_atomically
 from gripbench.errors import InputError
+from gripbench.writing import write_atomically
 
 _PLAIN = '''"""{title}: say here which paper and which equations."""
 
@@ -114,7 +114,6 @@ def write_method(name: str, folder: Path, compiled: bool) -> tuple[Path, Path]:
         "class_name": "".join(part.capitalize() for part in name.split("_")),
         "title": name.replace("_", " ").capitalize(),
     }
-    folder.mkdir(parents=True, exist_ok=True)
     write_atomically(method, (_COMPILED if compiled else _PLAIN).format(**words))
     write_atomically(test, _TEST.format(**words))
     return method, test

@@ -75,16 +75,14 @@ def plot(
     """Draw RMS and relative runtime by commit."""
     from gripbench.bench.publishing import history
     from gripbench.errors import InputError, nearest
+    from gripbench.writing import being_written
 
     suffixes = (".png", ".pdf", ".svg")
     if out.suffix not in suffixes:
         raise InputError(f"{out}: cannot draw '{out.suffix}': {nearest(out.suffix, suffixes)}")
     figure = history.plot(_frame(results, target, method))
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(out, dpi=150)
-    except OSError as error:
-        raise InputError(f"{out}: cannot be written: {error.strerror}") from None
+    with being_written(out) as path:
+        figure.savefig(path, dpi=150)
     print(f"wrote {out}")
 
 

@@ -54,12 +54,14 @@ def leaderboard(
     from gripbench.bench.publishing.regressions import compare as compare_leaderboards
     from gripbench.bench.publishing.tables import format_of, render, show
     from gripbench.bench.publishing.timings import read_timings
-    from gripbench.bench.running.store import read_rows, write_atomically
+    from gripbench.bench.running.store import read_rows
     from gripbench.errors import InputError, unknown
+    from gripbench.writing import check_writable, write_atomically
 
     base = read(compare) if compare is not None else None  # before --out may replace it
     if report is not None:
         format_of(report)
+        check_writable(report)
     suites = [load_suite(name) for name in suite or ()]
     names = [find_scenario(item).name for each in suites for item in each.scenarios]
     rows = read_rows(results, tuple(names) if suite else ())
@@ -81,7 +83,6 @@ def leaderboard(
     table = changes_table(changes)
     show(table)
     if report is not None:
-        report.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(report, render(table, format_of(report)))
     if base.runtimes and not current.runtimes:
         print("Runtimes were not compared: give --timings.")

@@ -38,10 +38,12 @@ def plot(
     from gripbench.bench.publishing.figures.run_plot import run_plot
     from gripbench.bench.publishing.figures.runs import Runs
     from gripbench.bench.publishing.figures.style import save, style
+    from gripbench.writing import check_writable
 
     chosen = split_methods(methods)
     if output is None:
         output = results / "plots" / f"{Path(scenario).stem}_{signal}_{seed}"
+    check_writable(output.parent / f"{output.name}.png")
     with style():
         figure = run_plot(Runs(), scenario, chosen, signal, seed, start, end)
         paths = save(figure, output.parent, output.name.removesuffix(".png"), dpi)

@@ -35,8 +35,10 @@ def report(
     from gripbench.bench.publishing.presentation import progress
     from gripbench.bench.publishing.report.page import write_report
     from gripbench.bench.running.backends import Backend
+    from gripbench.writing import check_writable
 
     path = output or results / "report.html"
+    check_writable(path)
     with progress("time series", 1) as bar:
 
         def advance(done: int, total: int) -> None:

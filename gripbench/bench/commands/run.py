@@ -70,13 +70,16 @@ def run(
     from gripbench.bench.running.recorded_scenarios import PREFIX
     from gripbench.bench.running.rows import Row, frame_of
     from gripbench.bench.running.runner import run_plan
-    from gripbench.bench.running.store import Store, write_atomically
+    from gripbench.bench.running.store import Store
+    from gripbench.writing import check_writable, write_atomically
 
+    if export is not None:
+        check_writable(export)
     chosen = [*(scenario or []), *(f"{PREFIX}{place}" for place in recording or [])]
     plan = plan_of(suite, chosen, method or [], seeds or None)
     targets = load_suite(suite).targets if suite else ()
     rows: list[Row] = []
-    with progress("running", plan.cells) as bar:
+    with progress("running", plan.size) as bar:
         task = bar.task_ids[0]
 
         def on_row(row: Row) -> None:
@@ -96,10 +99,9 @@ def run(
     print_summary(summary(shown))
     print_failures(frame)
     if export is not None:
-        export.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(export, scores_csv(frame))
     counts = ", ".join(f"{count} {status}" for status, count in sorted(report.statuses.items()))
     console().print(
-        f"{plan.cells} cells ({counts}); {report.computed} run, {report.stored} stored already; "
+        f"{plan.size} cells ({counts}); {report.computed} run, {report.stored} stored already; "
         f"{report.seconds:.1f} s"
     )

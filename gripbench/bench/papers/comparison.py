@@ -11,6 +11,7 @@ from gripbench.bench.papers.reproduction import Reproduction, reproduction_of
 from gripbench.bench.publishing import tables
 from gripbench.bench.publishing.manifest import manifest, write_manifest
 from gripbench.errors import GripbenchError
+from gripbench.writing import write_atomically
 
 
 def reproduce_paper(paper: str, directory: Path) -> list[str]:
@@ -59,15 +60,12 @@ def _make(directory: Path) -> None:
 
 
 def _write(directory: Path, result: Reproduction) -> None:
-    try:
-        for name, table in result.tables.items():
-            (directory / f"{name}.csv").write_text(tables.csv(table), encoding="utf-8")
-            (directory / f"{name}.tex").write_text(tables.latex(table), encoding="utf-8")
-        text = "\n\n".join(tables.markdown(table) for table in result.tables.values())
-        text += "\n\n" + "\n".join(f"- {line}" for line in result.lines) + "\n"
-        (directory / "README.md").write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise GripbenchError(f"{directory}: cannot be written ({error.strerror})") from None
+    for name, table in result.tables.items():
+        write_atomically(directory / f"{name}.csv", tables.csv(table))
+        write_atomically(directory / f"{name}.tex", tables.latex(table))
+    text = "\n\n".join(tables.markdown(table) for table in result.tables.values())
+    text += "\n\n" + "\n".join(f"- {line}" for line in result.lines) + "\n"
+    write_atomically(directory / "README.md", text)
 
 
 def _progress() -> Progress:

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 from gripbench.bench.publishing.figures.runs import Runs
 from gripbench.bench.publishing.figures.style import save, style
-from gripbench.errors import GripbenchError, InputError, unknown
+from gripbench.errors import InputError, unknown
+from gripbench.writing import write_atomically
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -105,11 +106,8 @@ def write_figures(
         with style():
             paths += save(figure.draw(runs), directory, figure.stem, dpi)
         advance()
-    try:
-        index = directory / "README.md"
-        index.write_text(_index(paper, directory), encoding="utf-8")
-    except OSError as error:
-        raise GripbenchError(f"{directory}: cannot be written ({error.strerror})") from None
+    index = directory / "README.md"
+    write_atomically(index, _index(paper, directory))
     return [*paths, index]
 
 

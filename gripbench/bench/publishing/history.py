@@ -20,9 +20,9 @@ from pydantic import Field
 from gripbench.bench.publishing.leaderboard import Leaderboard, Runs
 from gripbench.bench.publishing.tables import Column, Table
 from gripbench.bench.running.rows import pooled_rms
-from gripbench.bench.running.store import write_atomically
 from gripbench.configuration import Configuration, parse
 from gripbench.errors import InputError
+from gripbench.writing import write_atomically
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

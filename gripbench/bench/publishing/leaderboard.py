@@ -24,9 +24,9 @@ from gripbench.bench.publishing.timings import RelativeRuntime
 from gripbench.bench.ranking.grids import ANY
 from gripbench.bench.ranking.ranking import Board, boards
 from gripbench.bench.ranking.statistics import CONFIDENCE
-from gripbench.bench.running.store import write_atomically
 from gripbench.configuration import Configuration, parse
 from gripbench.errors import InputError
+from gripbench.writing import write_atomically
 
 SCHEMA_VERSION = 1
 """Version of leaderboard.json; those of every earlier version still load."""

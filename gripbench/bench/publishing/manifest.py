@@ -12,6 +12,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from gripbench.writing import write_atomically
+
 _LIBRARIES = ("numpy", "scipy", "numba", "pandas", "gymnasium", "pydantic")
 
 
@@ -43,7 +45,7 @@ def manifest(configuration: Mapping[str, Any], seeds: Mapping[str, Any]) -> dict
 def write_manifest(directory: Path, content: Mapping[str, Any]) -> Path:
     """Write a manifest as JSON into a directory; return its path."""
     path = directory / "manifest.json"
-    path.write_text(json.dumps(content, indent=2, sort_keys=True) + "\n", encoding="utf-8")
+    write_atomically(path, json.dumps(content, indent=2, sort_keys=True) + "\n")
     return path
 
 

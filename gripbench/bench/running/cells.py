@@ -1,46 +1,85 @@
-"""One chunk of work: a scenario is simulated once a seed, every method runs over that recording.
+"""A cell, the unit of a run, and the work on it: a chunk of cells in, their rows out.
 
-This is what a worker process does, wherever it is; rows go back to the process that asked.
+A scenario is simulated once a seed, and every method of the chunk runs over that recording. This is
+what a worker process does, wherever it is; rows go back to the process that asked.
 """
 
 from __future__ import annotations
 
 import atexit
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
-from gripbench.bench.catalogue.declarations import Declaration, Source, describe_error
+from gripbench.bench.catalogue.declarations import Source, describe_error
 from gripbench.bench.catalogue.registry import MethodSpec
 from gripbench.bench.running.execution import Outcome, SkippedError, execute, missing
 from gripbench.bench.running.fingerprints import versions
 from gripbench.bench.running.recorded_scenarios import RecordedScenario, judged, recording_of
 from gripbench.bench.running.rows import Row, Status
 from gripbench.bench.running.sandbox import Cage, CellFailure, Limits
+from gripbench.bench.running.store import row_path
 from gripbench.bench.scoring.scoring import DivergedError, score, targets_of
 from gripbench.envs.recordings import Recording, select_channels
 from gripbench.envs.scenarios import Scenario
+from gripbench.sources import digest
 
 
 @dataclass(frozen=True)
-class Task:
-    """The methods that run over one recording.
+class Cell:
+    """One method on one seed of one scenario: what a plan is made of, and what a row answers.
 
     Attributes
     ----------
     scenario, seed
         Which recording.
-    methods
-        Methods, each with the key of its cell.
-    limits
-        What a cell of an isolated method may take.
-    timed
-        Whether single calls of compiled methods are timed.
+    method
+        The method with its settings there.
+    world
+        Digest of what all methods of the scenario share: its recordings and their scoring.
+    key
+        Digest of everything that the result depends on.
     """
 
     scenario: Scenario
     seed: int
-    methods: tuple[tuple[MethodSpec, str], ...]
+    method: MethodSpec
+    world: str
+    key: str
+
+    @property
+    def path(self) -> Path:
+        """Where its row lies below the folder of rows."""
+        return row_path(self.scenario.name, self.method.label, self.seed)
+
+    @property
+    def recording(self) -> tuple[str, int]:
+        """What names its recording: cells with the same one need a single simulation."""
+        return self.scenario.name, self.seed
+
+
+def cell_of(scenario: Scenario, seed: int, method: MethodSpec, world: str) -> Cell:
+    """Return a cell with its key: world, versions, source and settings of the method, and seed."""
+    key = digest(world, repr(sorted(versions().items())), method.digest, str(seed))
+    return Cell(scenario, seed, method, world, key)
+
+
+@dataclass(frozen=True)
+class Task:
+    """Cells of one recording.
+
+    Attributes
+    ----------
+    cells
+        At least one; all have the same scenario and seed.
+    limits
+        What a simulation, and a cell of an isolated method, may take.
+    timed
+        Whether single calls of compiled methods are timed.
+    """
+
+    cells: tuple[Cell, ...]
     limits: Limits
     timed: bool
 
@@ -52,50 +91,51 @@ def run_tasks(tasks: tuple[Task, ...]) -> list[Row]:
 
 def run_task(task: Task) -> list[Row]:
     """Simulate a scenario once and run every method of the task over the recording."""
-    if isinstance(task.scenario, RecordedScenario) and task.scenario.absent:
-        reason = task.scenario.absent
-        return [_row(task, spec, key, (), "skipped", reason) for spec, key in task.methods]
+    scenario, seed = task.cells[0].scenario, task.cells[0].seed
+    if isinstance(scenario, RecordedScenario) and scenario.absent:
+        return [_row(cell, (), "skipped", scenario.absent) for cell in task.cells]
     try:
-        recording = recording_of(task.scenario, task.seed)
+        recording = recording_of(scenario, seed)
     except Exception as error:
         reason = f"the scenario could not be simulated: {describe_error(error)}"
         return [
-            _row(task, spec, key, spec.declaration.estimates, "failed", reason)
-            for spec, key in task.methods
+            _row(cell, cell.method.declaration.estimates, "failed", reason) for cell in task.cells
         ]
-    return [run_cell(task, spec, key, recording) for spec, key in task.methods]
+    return [run_cell(cell, recording, task.limits, task.timed) for cell in task.cells]
 
 
-def run_cell(task: Task, spec: MethodSpec, key: str, recording: Recording) -> Row:
+def run_cell(cell: Cell, recording: Recording, limits: Limits, timed: bool) -> Row:
     """Run one method over a recording and score it; whatever happens, there is a row."""
-    declaration = spec.declaration
+    declaration = cell.method.declaration
     channels = recording.observations.dtype.names or ()
     targets = targets_of(declaration.estimates, recording)
-    period = task.scenario.sample_time
     reason = missing(declaration, recording.vehicle, channels)
     if not reason and not targets:
         reason = "the scenario has no truth for any of its estimates"
     if reason:
-        return _row(task, spec, key, targets, "skipped", reason)
+        return _row(cell, targets, "skipped", reason)
     try:
-        outcome = _outcome(task, spec, recording, period)
-        if isinstance(task.scenario, RecordedScenario):
+        outcome = _outcome(cell, recording, limits, timed)
+        if isinstance(cell.scenario, RecordedScenario):
             recording = judged(recording, outcome.estimates)
         scores = score(outcome.estimates, declaration.outputs, targets, recording)
     except DivergedError as error:
-        return _row(task, spec, key, targets, "diverged", str(error))
+        return _row(cell, targets, "diverged", str(error))
     except SkippedError as error:
-        return _row(task, spec, key, targets, "skipped", str(error))
+        return _row(cell, targets, "skipped", str(error))
     except CellFailure as failure:
         status: Status = failure.status  # type: ignore[assignment]
-        return _row(task, spec, key, targets, status, str(failure))
+        limit = limits.time if status == "timeout" else None
+        row = _row(cell, targets, status, str(failure))
+        return row.model_copy(update={"time_limit": limit})
     except Exception as error:
-        return _row(task, spec, key, targets, "failed", describe_error(error))
-    row = _row(task, spec, key, tuple(scores), "ok", "")
+        return _row(cell, targets, "failed", describe_error(error))
+    row = _row(cell, tuple(scores), "ok", "")
     return row.model_copy(update={"scores": scores, "runtime": outcome.runtime})
 
 
-def _outcome(task: Task, spec: MethodSpec, recording: Recording, period: float) -> Outcome:
+def _outcome(cell: Cell, recording: Recording, limits: Limits, timed: bool) -> Outcome:
+    spec, period = cell.method, cell.scenario.sample_time
     if not spec.isolated:
         return execute(
             spec.make(),
@@ -103,9 +143,9 @@ def _outcome(task: Task, spec: MethodSpec, recording: Recording, period: float) 
             recording.vehicle,
             recording.observations,
             period,
-            task.timed,
+            timed,
         )
-    return _cage(spec.source, task.limits).execute(
+    return _cage(spec.source, limits).execute(
         spec.source,
         spec.declaration,
         spec.variant,
@@ -117,31 +157,24 @@ def _outcome(task: Task, spec: MethodSpec, recording: Recording, period: float) 
     )
 
 
-def _row(
-    task: Task,
-    spec: MethodSpec,
-    key: str,
-    targets: tuple[str, ...],
-    status: Status,
-    reason: str,
-) -> Row:
-    declaration: Declaration = spec.declaration
+def _row(cell: Cell, targets: tuple[str, ...], status: Status, reason: str) -> Row:
+    declaration = cell.method.declaration
     return Row(
-        key=key,
-        scenario=task.scenario.name,
-        seed=task.seed,
+        key=cell.key,
+        world=cell.world,
+        scenario=cell.scenario.name,
+        seed=cell.seed,
         method=declaration.name,
         title=declaration.title,
         variant=declaration.variant,
-        label=spec.label,
+        label=cell.method.label,
         parameters=declaration.settings,
         sensors=declaration.sensors,
         idealised=declaration.idealised,
         targets=targets,
         status=status,
         reason=reason,
-        sample_period=task.scenario.sample_time,
-        time_limit=task.limits.time if status == "timeout" else None,
+        sample_period=cell.scenario.sample_time,
         versions=versions(),
     )
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import importlib.metadata
 import inspect
 import json
+import os
 import platform
 from functools import cache
 from pathlib import Path
@@ -29,9 +30,19 @@ _PROJECT = Path(gripbench.__file__).parent
 @cache
 def versions() -> dict[str, str]:
     """Return the versions that every result depends on, by name."""
-    names = ("numpy", "numba", "scipy")
+    names = ("numpy", "numba", "llvmlite", "scipy")
     found = {name: importlib.metadata.version(name) for name in names}
-    return {"python": platform.python_version(), "machine": platform.machine(), **found}
+    switches = {name: os.environ[name] for name in COMPILER_SWITCHES if os.environ.get(name)}
+    machine = {"python": platform.python_version(), "machine": platform.machine()}
+    return {**machine, **found, **switches}
+
+
+COMPILER_SWITCHES = (
+    "NUMBA_BOUNDSCHECK", "NUMBA_CPU_FEATURES", "NUMBA_CPU_NAME", "NUMBA_DISABLE_INTEL_SVML",
+    "NUMBA_ENABLE_AVX", "NUMBA_LOOP_VECTORIZE", "NUMBA_OPT",
+    "NUMBA_SLP_VECTORIZE", "OPENBLAS_CORETYPE",
+)  # fmt: skip
+"""Environment variables that decide which machine code a result comes from."""
 
 
 def scenario_digest(scenario: Scenario) -> str:
@@ -59,3 +70,8 @@ _RECORDING = ("instruments/sensors.py", "recordings.py", "vehicles.py", "plants/
 def scoring_digest() -> str:
     """Return the digest of the code that turns estimates into scores."""
     return source_digest(_PROJECT / "bench" / "scoring" / "scoring.py")
+
+
+def world_digest(scenario: Scenario) -> str:
+    """Return the digest of a scenario and of the scoring: what rows of one board have in common."""
+    return digest(scenario_digest(scenario), scoring_digest())

@@ -9,18 +9,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from gripbench.configuration import Configuration, parse
-from gripbench.errors import InputError
+from gripbench.errors import LONGEST, InputError, one_line
 
 if TYPE_CHECKING:
     import pandas as pd
 
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 """Version of the stored form; rows of every earlier version still load (see `_MIGRATIONS`)."""
+
+Text = Annotated[str, BeforeValidator(lambda text: _storable(text))]
+"""Words of somebody else: any text can be stored, on one line and cut where it is endless."""
+
+
+def _storable(text: Any) -> Any:
+    return one_line(text, LONGEST) if isinstance(text, str) else text
+
 
 Status = Literal["ok", "failed", "timeout", "diverged", "skipped"]
 
@@ -36,8 +44,8 @@ UTILISATION_BANDS: tuple[tuple[str, float, float], ...] = (
 class Stratum(Configuration):
     """Sum of squared errors over the samples of one band of utilisation."""
 
-    sum_of_squares: float
-    count: int
+    sum_of_squares: float = Field(ge=0.0)
+    count: int = Field(ge=0)
 
     @property
     def rms(self) -> float | None:
@@ -62,8 +70,8 @@ class FrictionResponse(Configuration):
         Time [s] from the jump until the estimate has settled again; None: it never does.
     """
 
-    sum_of_squares: float
-    count: int
+    sum_of_squares: float = Field(ge=0.0)
+    count: int = Field(ge=0)
     delay: float | None = None
     jumped: bool = False
     jump_delay: float | None = None
@@ -95,9 +103,9 @@ class TargetScore(Configuration):
         For the available friction, its response to excitation; None where there is none.
     """
 
-    rms: float
-    sum_of_squares: float
-    count: int
+    rms: float = Field(ge=0.0)
+    sum_of_squares: float = Field(ge=0.0)
+    count: int = Field(ge=0)
     peak: float
     bias: float
     convergence_time: float | None = None
@@ -149,8 +157,17 @@ class Row(Configuration):
         `ok`, or what went wrong in one sentence.
     sample_period
         Nominal time [s] between samples: the deadline of a step.
-    time_limit
-        Limit [s] under which a row of status `timeout` was made.
+    time_limit, memory_limit
+        Limit [s], [MiB] that ended it: under a larger one it runs again.
+    passing
+        Whether what ended it lay outside the method (a kill, an edit while it ran): it runs again.
+    world
+        Digest of scenario and scoring: rows of two worlds never share a board.
+    dependencies
+        Digest of each file, folder and environment variable that the method was seen to read, by
+        kind and name; where one differs the cell runs again.
+    untracked
+        What it did whose result no digest can follow: the row is never used again.
     """
 
     schema_version: int = SCHEMA_VERSION
@@ -158,26 +175,38 @@ class Row(Configuration):
     scenario: str
     seed: int = Field(ge=0)
     method: str
-    title: str = ""
+    title: Text = ""
     variant: str = ""
     label: str
-    parameters: dict[str, float | str | bool | None] = Field(default_factory=dict)
+    parameters: dict[str, float | Text | bool | None] = Field(default_factory=dict)
     sensors: tuple[str, ...] = ()
     idealised: tuple[str, ...] = ()
     targets: tuple[str, ...] = ()
     status: Status
-    reason: str = ""
+    reason: Text = ""
     scores: dict[str, TargetScore] = Field(default_factory=dict)
     sample_period: float | None = None
     runtime: Runtime | None = None
     time_limit: float | None = None
+    memory_limit: float | None = None
+    passing: bool = False
+    world: str = ""
+    dependencies: dict[str, str] = Field(default_factory=dict)
+    untracked: tuple[str, ...] = ()
     versions: dict[str, str] = Field(default_factory=dict)
 
 
 _MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {
     1: lambda content: {**content, "schema_version": 2},  # 2 added the response of the friction
+    2: lambda content: {**content, "schema_version": 3},  # 3 added what a row rests on
 }
 """For each earlier version, the function that turns its content into the next version's."""
+
+
+def is_newer(content: dict[str, Any]) -> bool:
+    """Tell whether a later gripbench wrote a row."""
+    version = content.get("schema_version")
+    return isinstance(version, int) and version > SCHEMA_VERSION
 
 
 def row_from(content: dict[str, Any], source: str) -> Row:
@@ -188,10 +217,10 @@ def row_from(content: dict[str, Any], source: str) -> Row:
     InputError
         If a newer gripbench wrote it, or it is no row.
     """
-    version = content.get("schema_version")
-    if not isinstance(version, int) or version < 1:
+    version = content.get("schema_version") if isinstance(content, dict) else None
+    if not isinstance(version, int) or isinstance(version, bool) or version < 1:
         raise InputError(f"{source}: key 'schema_version' is {version!r}: not a row of gripbench")
-    if version > SCHEMA_VERSION:
+    if is_newer(content):
         raise InputError(
             f"{source}: written by a newer gripbench (schema version {version}, this one reads "
             f"up to {SCHEMA_VERSION}); update gripbench or choose another results folder"

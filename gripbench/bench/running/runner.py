@@ -1,4 +1,4 @@
-"""The runner: every cell of scenarios x seeds x methods gets a row, and only what is missing runs.
+"""The runner: a plan in, a stored row for each of its cells out; only what is missing runs.
 
 A row is stored as soon as it comes back from its worker, in one atomic step. A stored row is used
 again if its key, the digest of everything that the result depends on, is still the same; so a
@@ -11,20 +11,19 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
-from itertools import islice
+from itertools import groupby, islice
 from typing import Any
 
 from gripbench.bench.catalogue.registry import MethodSpec
 from gripbench.bench.running.backends import Backend, WorkerLostError
-from gripbench.bench.running.cells import Task, close_cages, run_tasks
-from gripbench.bench.running.fingerprints import scenario_digest, scoring_digest, versions
+from gripbench.bench.running.cells import Cell, Task, cell_of, close_cages, run_tasks
+from gripbench.bench.running.fingerprints import world_digest
 from gripbench.bench.running.recorded_scenarios import RecordedScenario, on_recording
 from gripbench.bench.running.rows import Row
 from gripbench.bench.running.sandbox import Limits, end_declaring
 from gripbench.bench.running.store import DamagedRowError, Store
 from gripbench.envs.scenarios import Scenario
 from gripbench.errors import InputError
-from gripbench.sources import digest
 
 CHUNK = 4
 """Seeds in a chunk of work, where no method runs isolated."""
@@ -53,9 +52,18 @@ class Plan:
         return tuple(seed for seed in chosen if seed < scenario.runs)
 
     @property
-    def cells(self) -> int:
-        """Number of rows that the plan ends with."""
+    def size(self) -> int:
+        """Number of cells, and so of rows that the plan ends with."""
         return len(self.methods) * sum(len(self.seeds_of(item)) for item in self.scenarios)
+
+    def cells(self) -> Iterator[Cell]:
+        """Yield every cell, those of one recording next to each other."""
+        for scenario in self.scenarios:
+            world = world_digest(scenario)
+            methods = [on_recording(method, scenario) for method in self.methods]
+            for seed in self.seeds_of(scenario):
+                for method in methods:
+                    yield cell_of(scenario, seed, method, world)
 
 
 @dataclass
@@ -114,15 +122,26 @@ def run_plan(
     _check_labels(plan)
     began = time.perf_counter()
     report = Report()
-    keys = _keys(plan)
-    waiting = list(_waiting(plan, store, keys, limits, fresh, report, on_row))
+    waiting = []
+    for cell in plan.cells():
+        if fresh:
+            store.remove(cell.scenario.name, cell.method.label, cell.seed)
+        row = _reusable(store, cell, limits)
+        if row is None:
+            waiting.append(cell)
+            continue
+        report.stored += 1
+        report.statuses[row.status] += 1
+        on_row(row)
     lost = 0
     try:
         while waiting:
+            done = set()
             try:
-                for rows in backend.run(run_tasks, _chunks(plan, waiting, keys, limits)):
+                for rows in backend.run(run_tasks, _chunks(plan, waiting, limits, backend)):
                     for row in rows:
                         store.write(row)
+                        done.add((row.scenario, row.label, row.seed))
                         report.computed += 1
                         report.statuses[row.status] += 1
                         on_row(row)
@@ -131,8 +150,12 @@ def run_plan(
                 lost += 1
                 if lost > RETRIES:
                     raise
-                # What came back is stored under today's keys: only the rest runs again.
-                waiting = list(_unfinished(waiting, plan, store, keys))
+                # what came back is stored: only the rest runs again
+                waiting = [
+                    cell
+                    for cell in waiting
+                    if (cell.scenario.name, cell.method.label, cell.seed) not in done
+                ]
     finally:
         close_cages()
         end_declaring()
@@ -140,119 +163,38 @@ def run_plan(
     return report
 
 
-@dataclass(frozen=True)
-class _Waiting:
-    """Cells of one recording that have to run: methods by index."""
-
-    scenario: Scenario
-    seed: int
-    methods: tuple[int, ...]
-
-
-Keys = dict[tuple[str, int], str]
-
-
-def _keys(plan: Plan) -> Keys:
-    """Return the part of the keys that seeds share, by scenario and index of the method."""
-    environment = repr(sorted(versions().items()))
-    keys = {}
-    for scenario in plan.scenarios:
-        base = digest(scenario_digest(scenario), scoring_digest(), environment)
-        for index, method in enumerate(plan.methods):
-            keys[scenario.name, index] = digest(base, method.digest)
-    return keys
-
-
-def _key(keys: Keys, scenario: Scenario, method: int, seed: int) -> str:
-    return digest(keys[scenario.name, method], str(seed))
-
-
-def _waiting(
-    plan: Plan,
-    store: Store,
-    keys: Keys,
-    limits: Limits,
-    fresh: bool,
-    report: Report,
-    on_row: Callable[[Row], Any],
-) -> Iterator[_Waiting]:
-    """Yield the cells that have no valid row; count and hand on the rows of the others."""
-    for scenario in plan.scenarios:
-        for seed in plan.seeds_of(scenario):
-            methods = []
-            for index, method in enumerate(plan.methods):
-                if fresh:
-                    store.path(scenario.name, method.label, seed).unlink(missing_ok=True)
-                row = _stored(
-                    store, scenario.name, method.label, seed, _key(keys, scenario, index, seed)
-                )
-                if row is not None and not _may_end_otherwise(row, limits):
-                    report.stored += 1
-                    report.statuses[row.status] += 1
-                    on_row(row)
-                else:
-                    methods.append(index)
-            if methods:
-                yield _Waiting(scenario, seed, tuple(methods))
-
-
-def _stored(store: Store, scenario: str, label: str, seed: int, key: str) -> Row | None:
+def _reusable(store: Store, cell: Cell, limits: Limits) -> Row | None:
+    """Return the stored row of a cell, None where it has to run (again)."""
     try:
-        row = store.read(scenario, label, seed)
+        row = store.read(cell.scenario.name, cell.method.label, cell.seed)
     except DamagedRowError:
         return None
-    return row if row is not None and row.key == key else None
-
-
-def _may_end_otherwise(row: Row, limits: Limits) -> bool:
-    """Tell whether a row of a timeout was made under a shorter limit than now."""
-    return row.status == "timeout" and (row.time_limit or 0.0) < limits.time
-
-
-def _unfinished(
-    waiting: Iterable[_Waiting], plan: Plan, store: Store, keys: Keys
-) -> Iterator[_Waiting]:
-    for item in waiting:
-        methods = tuple(
-            index
-            for index in item.methods
-            if not _stored(
-                store,
-                item.scenario.name,
-                plan.methods[index].label,
-                item.seed,
-                _key(keys, item.scenario, index, item.seed),
-            )
-        )
-        if methods:
-            yield _Waiting(item.scenario, item.seed, methods)
+    if row is None or row.key != cell.key or row.passing or row.untracked:
+        return None
+    if row.status == "timeout" and (row.time_limit or 0.0) < limits.time:
+        return None
+    if row.memory_limit is not None and row.memory_limit < limits.memory / 1024**2:
+        return None
+    return row
 
 
 def _chunks(
-    plan: Plan, waiting: list[_Waiting], keys: Keys, limits: Limits
+    plan: Plan, waiting: list[Cell], limits: Limits, backend: Backend
 ) -> Iterator[tuple[Task, ...]]:
+    """Yield tasks to send to workers, the first ones of a single cell: rows come from the start."""
+    first = {scenario.name: plan.seeds_of(scenario)[0] for scenario in plan.scenarios}
+
+    def task(cells: Iterable[Cell]) -> Task:
+        chosen = tuple(cells)
+        name, seed = chosen[0].recording
+        return Task(chosen, limits, timed=seed == first[name])
+
+    alone = 2 * backend.processes
+    yield from ((task([cell]),) for cell in waiting[:alone])
+    recordings = groupby(waiting[alone:], key=lambda cell: cell.recording)
+    tasks = (task(cells) for _, cells in recordings)
     isolated = any(method.isolated for method in plan.methods)
-    local: dict[tuple[str, int], MethodSpec] = {}
-
-    def method_on(scenario: Scenario, index: int) -> MethodSpec:
-        if (scenario.name, index) not in local:
-            local[scenario.name, index] = on_recording(plan.methods[index], scenario)
-        return local[scenario.name, index]
-
-    tasks = (
-        Task(
-            scenario=item.scenario,
-            seed=item.seed,
-            methods=tuple(
-                (method_on(item.scenario, index), _key(keys, item.scenario, index, item.seed))
-                for index in item.methods
-            ),
-            limits=limits,
-            timed=item.seed == plan.seeds_of(item.scenario)[0],
-        )
-        for item in waiting
-    )
-    size = 1 if isolated else CHUNK
+    size = 1 if isolated or backend.processes == 1 else CHUNK
     while chunk := tuple(islice(tasks, size)):
         yield chunk
 

@@ -14,6 +14,7 @@ from gripbench.bench.running.recorded import published_methods, scored_samples
 from gripbench.bench.running.yardsticks import YARDSTICKS
 from gripbench.envs.recordings import Recording
 from gripbench.logs.published import load_recording
+from gripbench.writing import being_written
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -41,12 +42,13 @@ def write_pictures(names: Sequence[str], directory: Path, folder: Path | None = 
     folder
         Where the recordings' files lie, see `gripbench.logs.locations`.
     """
-    directory.mkdir(parents=True, exist_ok=True)
     written = []
     for name in names:
         path = directory / f"recording_{name}.png"
         with style():
-            draw(name, folder).savefig(path, dpi=150)
+            figure = draw(name, folder)
+            with being_written(path) as temporary:
+                figure.savefig(temporary, dpi=150)
         written.append(path)
     return written
 

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gripbench.envs.signals import signal
-from gripbench.errors import GripbenchError
+from gripbench.writing import being_written
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -190,14 +190,12 @@ def save(figure: Figure, directory: Path, stem: str, dpi: int = 150) -> list[Pat
 
     Raises
     ------
-    GripbenchError
+    InputError
         If the directory cannot be written.
     """
     paths = [directory / f"{stem}.png", directory / f"{stem}.pdf"]
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-        figure.savefig(paths[0], dpi=dpi, metadata={"Software": None})
-        figure.savefig(paths[1], metadata={"CreationDate": None, "Producer": None, "Creator": None})
-    except OSError as error:
-        raise GripbenchError(f"{directory}: cannot be written ({error.strerror})") from None
+    with being_written(paths[0]) as path:
+        figure.savefig(path, dpi=dpi, metadata={"Software": None})
+    with being_written(paths[1]) as path:
+        figure.savefig(path, metadata={"CreationDate": None, "Producer": None, "Creator": None})
     return paths

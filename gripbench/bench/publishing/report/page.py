@@ -32,8 +32,9 @@ from gripbench.bench.publishing.report.content import (
 )
 from gripbench.bench.publishing.report.series import POINTS, SeriesPlan, all_series
 from gripbench.bench.running.recorded_scenarios import at_hand
-from gripbench.bench.running.store import read_rows, write_atomically
+from gripbench.bench.running.store import read_rows
 from gripbench.errors import InputError
+from gripbench.writing import write_atomically
 
 _DARK = ("#56B4E9", "#FF8A4C", "#2FCB9A", "#E79BC8", "#F2C04D", "#B7A4FF")
 _DASHES = ("dash", "dot", "dashdot", "longdash", "solid", "longdashdot")
