@@ -31,7 +31,13 @@ if TYPE_CHECKING:
     from gripbench.bench.running.api import run
     from gripbench.bench.running.store import read_rows
     from gripbench.envs.worlds import load_scenario, record
-    from gripbench.methods.contract import CompiledMethod, Estimator, Parameter, compiled
+    from gripbench.methods.contract import (
+        CompiledMethod,
+        Estimator,
+        Parameter,
+        Variant,
+        compiled,
+    )
 
 # numba's cache must see edits of what a function calls, see gripbench.compilation
 _LOCATORS = (
@@ -48,6 +54,7 @@ DEFINED_IN = {
     "CompiledMethod": "gripbench.methods.contract",
     "Estimator": "gripbench.methods.contract",
     "Parameter": "gripbench.methods.contract",
+    "Variant": "gripbench.methods.contract",
     "check_estimator": "gripbench.bench.catalogue.check",
     "compiled": "gripbench.methods.contract",
     "load_scenario": "gripbench.envs.worlds",
@@ -64,6 +71,7 @@ __all__ = [
     "CompiledMethod",
     "Estimator",
     "Parameter",
+    "Variant",
     "check_estimator",
     "compiled",
     "load_scenario",

@@ -1,4 +1,4 @@
-"""Keeps numba's cache true: a compiled function is stale when anything that it calls changes.
+"""How functions are compiled: the two sets of options, and a cache that sees every edit.
 
 numba compares the file of a function only, so a step would keep running the old form of a
 building block that was edited in another module. The locator below answers with the digest of
@@ -7,13 +7,25 @@ the file and of all that it imports from the project.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numba
 from numba.core.caching import InTreeCacheLocator, UserWideCacheLocator
 
 from gripbench.sources import imports_gripbench, source_digest
+
+
+def compiled(function: Callable[..., Any]) -> Any:
+    """Compile a function over records; division by zero gives inf or NaN as in NumPy."""
+    return numba.njit(cache=True, error_model="numpy", nogil=True)(function)
+
+
+def inlined(function: Callable[..., Any]) -> Any:
+    """Compile a short function into each of its callers."""
+    return numba.njit(inline="always", error_model="numpy")(function)
 
 
 @cache

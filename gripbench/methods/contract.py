@@ -6,8 +6,10 @@ A method's mathematics is one function over records::
     def step(state, obs, params, est):
         est.force_x_front = 0.5 * params.mass * obs.accel_x
 
-`obs` holds `time` and the channels that the method declared, `params` the vehicle parameters and
-the method's own parameters that it declared, `state` whatever it keeps between samples, `est` the
+`obs` holds `time` and the channels that the method declared, and two fields that the driver adds:
+`elapsed`, the time since the sample before (never negative, 0 for the first one or where the clock
+steps back), and `first`, 1 for the first sample. `params` holds the vehicle parameters and the
+method's own parameters that it declared, `state` whatever it keeps between samples, `est` the
 estimates that it declared. Numba compiles the function; `step.py_func` is the plain Python that a
 debugger can enter.
 
@@ -21,19 +23,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
+from gripbench.compilation import compiled
 from gripbench.envs.signals import VARIANCE, record_type, signal
 from gripbench.envs.vehicles import require
-from gripbench.errors import InputError, UndeclaredChannelError, nearest, unknown
+from gripbench.errors import InputError, UndeclaredChannelError, unknown
 from gripbench.methods import drivers
-
-
-def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile a function over records; division by zero gives inf or NaN as in NumPy."""
-    return numba.njit(cache=True, error_model="numpy", nogil=True)(function)
+from gripbench.methods.settings import Parameter, Setting, Variant, checked_settings
 
 
 @runtime_checkable
@@ -51,18 +49,6 @@ class Estimator(Protocol):
     def update(self, obs: Mapping[str, float]) -> Mapping[str, float]:
         """Take one sample, `time` and the declared channels; return the declared estimates."""
         ...
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """A tuning parameter of a method: a number with unit, default and allowed range."""
-
-    name: str
-    default: float
-    unit: str
-    description: str
-    low: float = -np.inf
-    high: float = np.inf
 
 
 class CompiledMethod:
@@ -97,11 +83,9 @@ class CompiledMethod:
     parameters
         Its own parameters.
     variants
-        Settings by variant name: parameter values that differ from the default.
-    sensors_of
-        Channels by variant name, for a variant that reads other channels than `sensors`.
-    steps_of
-        Steps by variant name, for a variant that needs another one than `step`.
+        What differs in each variant, by name: a `Variant`, or only its settings.
+    baseline
+        Whether it is a trivial estimator that others are measured against.
     state
         Structured type of what it keeps between samples; all zero after `reset`.
     step
@@ -116,25 +100,32 @@ class CompiledMethod:
     sensors: tuple[str, ...]
     estimates: ClassVar[tuple[str, ...]]
     variances: ClassVar[tuple[str, ...]] = ()
-    vehicle_parameters: ClassVar[tuple[str, ...]] = ()
+    vehicle_parameters: tuple[str, ...] = ()
     parameters: ClassVar[tuple[Parameter, ...]] = ()
-    variants: ClassVar[Mapping[str, Mapping[str, float]]] = {}
-    sensors_of: ClassVar[Mapping[str, tuple[str, ...]]] = {}
-    steps_of: ClassVar[Mapping[str, Callable[..., Any]]] = {}
+    variants: ClassVar[Mapping[str, Any]] = {}
+    baseline: ClassVar[bool] = False
     state: ClassVar[np.dtype[Any]]
     step: Callable[..., Any]
     start: ClassVar[Callable[..., Any] | None] = None
 
-    def __init__(self, variant: str = "corrected", **overrides: float) -> None:
-        settings = {parameter.name: parameter.default for parameter in self.parameters}
-        if variant != "corrected":
-            if variant not in self.variants:
-                raise unknown(f"variant of {self.name}", variant, ["corrected", *self.variants])
-            settings.update(self.variants[variant])
+    def __init_subclass__(cls, **arguments: Any) -> None:
+        super().__init_subclass__(**arguments)
+        cls.variants = {
+            name: given if isinstance(given, Variant) else Variant(given)
+            for name, given in cls.variants.items()
+        }
+
+    def __init__(self, variant: str = "corrected", **overrides: Setting) -> None:
+        if variant != "corrected" and variant not in self.variants:
+            raise unknown(f"variant of {self.name}", variant, ["corrected", *self.variants])
+        chosen: Variant = self.variants.get(variant, Variant())
         self.variant = variant
-        self.settings = _checked(self.name, self.parameters, settings, overrides)
-        self.sensors = self.sensors_of.get(variant, type(self).sensors)
-        self.step = self.steps_of.get(variant, type(self).step)
+        self.settings = checked_settings(self.name, self.parameters, chosen.settings, overrides)
+        if chosen.sensors is not None:
+            self.sensors = chosen.sensors
+        if chosen.vehicle_parameters is not None:
+            self.vehicle_parameters = chosen.vehicle_parameters
+        self.step = chosen.step or type(self).step
         self._types = _record_types(self)
         self._records: drivers.Records | None = None
 
@@ -184,8 +175,8 @@ class CompiledMethod:
         params = np.zeros(1, self._types.params)
         for name, value in require(dict(vehicle), self.vehicle_parameters, self.name).items():
             params[name] = value
-        for name, value in self.settings.items():
-            params[name] = value
+        for parameter in self.parameters:
+            params[parameter.name] = parameter.number(self.settings[parameter.name])
         records = drivers.Records(
             state=np.zeros(1, self._types.state),
             obs=np.zeros(1, self._types.obs),
@@ -215,32 +206,17 @@ def _record_types(method: CompiledMethod) -> _RecordTypes:
     params = [(name, np.float64) for name in (*method.vehicle_parameters, *own)]
     return _RecordTypes(
         state=method.state,
-        # `time` last: numba takes a record for a subtype of one that it begins with
-        obs=record_type((*method.sensors, "time")),
+        obs=drivers.observation_type(method.sensors),
         params=np.dtype(params or [("none", np.float64)]),
         est=record_type(method.outputs),
     )
 
 
-def _checked(
-    name: str,
-    parameters: tuple[Parameter, ...],
-    settings: dict[str, float],
-    overrides: Mapping[str, float],
-) -> dict[str, float]:
-    known = {parameter.name: parameter for parameter in parameters}
-    for key in overrides:
-        if key not in known:
-            raise InputError(f"{name}: unknown parameter '{key}': {nearest(key, known)}")
-    settings = settings | dict(overrides)
-    for key, value in settings.items():
-        allowed = known[key]
-        if not (isinstance(value, int | float) and allowed.low <= value <= allowed.high):
-            raise InputError(
-                f"{name}: parameter '{key}' is {value!r}; "
-                f"allowed is {allowed.low:g} to {allowed.high:g} {allowed.unit}"
-            )
-    return {key: float(value) for key, value in settings.items()}
-
-
-__all__ = ["CompiledMethod", "Estimator", "Parameter", "UndeclaredChannelError", "compiled"]
+__all__ = [
+    "CompiledMethod",
+    "Estimator",
+    "Parameter",
+    "UndeclaredChannelError",
+    "Variant",
+    "compiled",
+]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -10,6 +11,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numba
+import numpy as np
 import numpy.typing as npt
 from numba.core.errors import NumbaError
 
@@ -28,18 +30,30 @@ class Records:
     obs: npt.NDArray[Any]
     params: npt.NDArray[Any]
     est: npt.NDArray[Any]
+    time: float = math.nan  # of the last sample
+
+
+def observation_type(channels: tuple[str, ...]) -> np.dtype[Any]:
+    """Return the type of the observations that a step sees."""
+    # `time` and what follows last: numba takes a record for a subtype of one that it begins with
+    return np.dtype([(name, np.float64) for name in (*channels, "time", "elapsed", "first")])
 
 
 def online(method: CompiledMethod, records: Records, obs: Mapping[str, float]) -> dict[str, float]:
     """Advance a method by one sample and return its estimates by name."""
     sample = records.obs
-    names = sample.dtype.names or ()
+    names = (sample.dtype.names or ())[:-2]
     try:
-        sample[0] = tuple([obs[name] for name in names])
+        given = [obs[name] for name in names]
     except KeyError as error:
         raise UndeclaredChannelError(
             f"{method.name}: the observation lacks the declared channel {error}"
         ) from None
+    time, last = given[-1], records.time
+    elapsed = time - last if last < time < math.inf else 0.0
+    sample[0] = (*given, elapsed, float(last != last))
+    if math.isfinite(time):
+        records.time = time
     _call(method, _single(method.step), records.state, sample, records.params, records.est)
     return dict(zip(method.outputs, records.est[0].item(), strict=True))
 
@@ -49,8 +63,27 @@ def batch(
 ) -> npt.NDArray[Any]:
     """Run a method over a recording and return its estimates, shape (n,)."""
     selected = select_channels(observations, method.sensors)
-    _call(method, _loop(method.step), records.state, selected, records.params, records.est)
+    samples = np.empty(len(selected), observation_type(method.sensors))
+    for name in selected.dtype.names or ():
+        samples[name] = selected[name]
+    samples["elapsed"], samples["first"] = _clock(samples["time"])
+    _call(method, _loop(method.step), records.state, samples, records.params, records.est)
     return records.est
+
+
+def _clock(times: npt.NDArray[np.float64]) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+    """Return the time since the sample before, never negative, and which sample is the first.
+
+    A sample without a time takes none, and the one after it counts from the last that had one.
+    """
+    known = np.isfinite(times)
+    held = times
+    if not known.all():
+        held = times[np.maximum.accumulate(np.where(known, np.arange(len(times)), 0))]
+    passed = np.diff(held, prepend=held[:1])
+    first = np.zeros(len(times))
+    first[: (int(known.argmax()) if known.any() else len(times)) + 1] = 1.0
+    return np.where(known & (passed > 0.0), passed, 0.0), first
 
 
 @cache

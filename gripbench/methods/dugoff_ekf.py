@@ -63,12 +63,12 @@ DUGOFF_PARAMETERS = (
     Parameter("yaw_rate_noise", 1.745e-4, "rad/s/sqrt(Hz)", "Density of the gyro's noise", 1e-9),
     Parameter("speed_y_std", 0.1, "m/s", "Standard deviation of v_y at the start", 0.0),
     Parameter("lowest_speed", 2.0, "m/s", "Speed below which the slips are held at it", 0.1),
-    Parameter("correction", 1.0, "-", "0: the model alone, open loop", 0.0, 1.0),
+    Parameter("correction", True, "-", "Measurements correct the model; else it runs open loop"),
     Parameter("load_transfer_track", 1.0, "-", "Share of the track in eq. 6", 0.1, 2.0),
-    Parameter("printed_step", 0.0, "-", "1: forward Euler step", 0.0, 1.0),
-    Parameter("printed_slip", 0.0, "-", "1: 1 - lambda in eq. 2 and 4", 0.0, 1.0),
-    Parameter("printed_jacobian", 0.0, "-", "1: F of eq. 11 without the tyres", 0.0, 1.0),
-    Parameter("printed_update", 0.0, "-", "1: eq. 12 from x(k-1|k-1)", 0.0, 1.0),
+    Parameter("printed_step", False, "-", "Forward Euler step"),
+    Parameter("printed_slip", False, "-", "1 - lambda in eq. 2 and 4"),
+    Parameter("printed_jacobian", False, "-", "F of eq. 11 without the tyres"),
+    Parameter("printed_update", False, "-", "Eq. 12 from x(k-1|k-1)"),
 )
 
 
@@ -291,18 +291,18 @@ class DugoffEkf(CompiledMethod):
     parameters = DUGOFF_PARAMETERS
     variants = {
         "paper": {
-            "printed_step": 1.0,
+            "printed_step": True,
             "load_transfer_track": 0.5,
-            "printed_slip": 1.0,
-            "printed_jacobian": 1.0,
-            "printed_update": 1.0,
+            "printed_slip": True,
+            "printed_jacobian": True,
+            "printed_update": True,
         },
-        "paper_step": {"printed_step": 1.0},
-        "paper_slip": {"printed_slip": 1.0},
+        "paper_step": {"printed_step": True},
+        "paper_slip": {"printed_slip": True},
         "paper_load_transfer": {"load_transfer_track": 0.5},
-        "paper_jacobian": {"printed_jacobian": 1.0},
-        "paper_update": {"printed_update": 1.0},
-        "open_loop": {"correction": 0.0},
+        "paper_jacobian": {"printed_jacobian": True},
+        "paper_update": {"printed_update": True},
+        "open_loop": {"correction": False},
     }
     state = DUGOFF_STATE
     step = staticmethod(_step)

@@ -26,23 +26,21 @@ from gripbench.methods.blocks.axle_friction import (
     AXLE_FRICTION_PARAMETERS,
     AXLE_FRICTION_STATE,
     AXLE_FRICTION_VEHICLE,
+    MAGIC_FORMULA,
+    PRINTED,
+    RESISTANCE_PARAMETERS,
     axle_slips,
     estimate_friction,
     start_friction,
 )
 from gripbench.methods.blocks.kalman import correct_scalar, filter_type, predict
-from gripbench.methods.blocks.longitudinal_model import (
-    RESISTANCE_PARAMETERS,
-)
-from gripbench.methods.blocks.rls import MAGIC_FORMULA, PRINTED
-from gripbench.methods.contract import CompiledMethod, Parameter, compiled
+from gripbench.methods.contract import CompiledMethod, Parameter, Variant, compiled
 
 SPEED, WHEEL_FRONT, WHEEL_REAR, FORCE_FRONT, FORCE_REAR = 0, 1, 2, 3, 4
 
 STATE = np.dtype(
     [
         ("filter", filter_type(5)),
-        *((name, np.float64) for name in ("time", "samples", "torque_front", "torque_rear")),
         *((name, np.float64) for name in AXLE_FRICTION_STATE),
     ]
 )
@@ -116,16 +114,13 @@ def _finish(state, obs, elapsed, params, est):  # type: ignore[no-untyped-def]
 @compiled
 def _step(state, obs, accel_x, params, est):  # type: ignore[no-untyped-def]
     kalman = state.filter
-    elapsed = 0.0
-    if state.samples == 0.0:
+    elapsed = obs.elapsed
+    if obs.first:
         kalman.x[SPEED] = obs.speed_gps
         kalman.x[WHEEL_FRONT] = obs.wheel_speed_front
         kalman.x[WHEEL_REAR] = obs.wheel_speed_rear
     else:
-        elapsed = obs.time - state.time
         advance(kalman, obs.torque_front, obs.torque_rear, elapsed, params)
-    state.time = obs.time
-    state.samples += 1.0
     measure(kalman, accel_x, obs.wheel_speed_front, obs.wheel_speed_rear, obs.speed_gps, params)
     _finish(state, obs, elapsed, params, est)
 
@@ -171,29 +166,29 @@ class ExtendedKalmanFilter(CompiledMethod):
         Parameter("acceleration_variance", 1e-3, "m^2/s^4", "Variance of a_x", 1e-12),
         Parameter("wheel_speed_variance", 1e-5, "rad^2/s^2", "Variance of wheel speeds", 1e-12),
         Parameter("force_variance", 1e6, "N^2", "Initial variance of the tyre forces", 0.0),
-        Parameter("resistances", 1.0, "-", "1: drag and rolling resistance in a_x", 0.0, 1.0),
+        Parameter("resistances", True, "-", "Drag and rolling resistance in a_x"),
     )
     variants = {
-        "paper": PRINTED
-        | {
-            "wheel_speed_density": 0.01,
-            "force_density": 2e8,
-            "acceleration_variance": 0.09,
-            "resistances": 0.0,
-        },
+        "paper": Variant(
+            PRINTED
+            | {
+                "wheel_speed_density": 0.01,
+                "force_density": 2e8,
+                "acceleration_variance": 0.09,
+                "resistances": False,
+            },
+            sensors=(
+                "wheel_speed_front",
+                "wheel_speed_rear",
+                "torque_front",
+                "torque_rear",
+                "speed_x_rate",
+                "speed_gps",
+            ),
+            step=step_printed,
+        ),
         "magic_formula": MAGIC_FORMULA,
-    }
-    sensors_of = {
-        "paper": (
-            "wheel_speed_front",
-            "wheel_speed_rear",
-            "torque_front",
-            "torque_rear",
-            "speed_x_rate",
-            "speed_gps",
-        )
     }
     state = STATE
     start = staticmethod(start)
     step = staticmethod(step)
-    steps_of = {"paper": step_printed}

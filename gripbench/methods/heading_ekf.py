@@ -90,24 +90,24 @@ HEADING_PARAMETERS = (
     Parameter("yaw_walk", 0.03 * _DEGREE, "rad/sqrt(s)", "Random walk of the yaw", 0.0, 1.0),
     Parameter("roll_time", 5.0, "s", "Correlation time of that roll", 1e-3),
     Parameter("roll_std", 1.0 * _DEGREE, "rad", "Roll that the springs do not explain", 0.0, 1.0),
-    Parameter("roll_model", 1.0, "-", "1: the roll returns to that of the springs", 0.0, 1.0),
+    Parameter("roll_model", True, "-", "The roll returns to that of the springs"),
     Parameter("roll_walk", 0.0, "rad/sqrt(s)", "Random walk of the roll", 0.0, 1.0),
     Parameter("alignment_time", 0.5, "s", "Time over which the first heading is averaged", 0.0),
     Parameter("alignment_pitch_std", 1.0 * _DEGREE, "rad", "Pitch while aligning", 0.0, 1.0),
-    Parameter("pitch_from_gps", 0.0, "-", "1: road pitch from the vertical velocity", 0.0, 1.0),
+    Parameter("pitch_from_gps", False, "-", "Road pitch from the vertical velocity"),
     Parameter("pitch_walk", 0.3 * _DEGREE, "rad/sqrt(s)", "Random walk of the pitch", 0.0, 1.0),
     Parameter("velocity_std", 0.05, "m/s", "GPS velocity noise an axis", 1e-6, 100.0),
     Parameter(
         "accelerometer_roll_std", 0.0, "rad sqrt(s)",
         "Noise density of the roll from the lateral accelerometer; 0: not used", 0.0, 100.0,
     ),
-    Parameter("printed_4", 0.0, "-", "1: the threshold is on the distance itself", 0.0, 1.0),
-    Parameter("printed_6", 0.0, "-", "1: m_z as eq. 6 prints it", 0.0, 1.0),
-    Parameter("printed_7", 0.0, "-", "1: rates of the angles as eq. 7 prints them", 0.0, 1.0),
+    Parameter("printed_4", False, "-", "The threshold is on the distance itself"),
+    Parameter("printed_6", False, "-", "m_z as eq. 6 prints it"),
+    Parameter("printed_7", False, "-", "Rates of the angles as eq. 7 prints them"),
 )  # fmt: skip
 
 PITCH_AWARE = {
-    "pitch_from_gps": 1.0,
+    "pitch_from_gps": True,
     "pitch_std": 5.0 * _DEGREE,
     "roll_std": 0.7 * _DEGREE,
     "accelerometer_roll_std": 4.0 * _DEGREE,
@@ -122,10 +122,10 @@ TABLE_1_NOISE = {
 }
 """The noise of Table 1 and neither of the two additions."""
 
-PRINTED_HEADING = TABLE_1_NOISE | {"printed_4": 1.0, "printed_6": 1.0, "printed_7": 1.0}
+PRINTED_HEADING = TABLE_1_NOISE | {"printed_4": True, "printed_6": True, "printed_7": True}
 """The same with the equations as printed."""
 
-NO_ROLL_MODEL = {"roll_model": 0.0, "roll_time": 2.0, "roll_std": 1.5 * _DEGREE}
+NO_ROLL_MODEL = {"roll_model": False, "roll_time": 2.0, "roll_std": 1.5 * _DEGREE}
 """Roll around zero, without the springs."""
 
 UNGATED = 1e300

@@ -21,20 +21,17 @@ from gripbench.methods.blocks.axle_friction import (
     AXLE_FRICTION_PARAMETERS,
     AXLE_FRICTION_STATE,
     AXLE_FRICTION_VEHICLE,
+    MAGIC_FORMULA,
+    PRINTED,
+    RESISTANCE_PARAMETERS,
     axle_slips,
     estimate_friction,
     start_friction,
-)
-from gripbench.methods.blocks.longitudinal_model import (
-    RESISTANCE_PARAMETERS,
     total_force,
 )
-from gripbench.methods.blocks.rls import MAGIC_FORMULA, PRINTED
 from gripbench.methods.contract import CompiledMethod, Parameter, compiled
 
 _NAMES = (
-    "time",
-    "samples",
     "wheel_speed_front",
     "wheel_speed_rear",
     "difference",
@@ -52,19 +49,15 @@ def start(state, params):  # type: ignore[no-untyped-def]
 @compiled
 def step(state, obs, params, est):  # type: ignore[no-untyped-def]
     """Take one sample: forces by eq. 22, slip by eq. 5, friction by eq. 11-15."""
-    elapsed = 0.0
-    if state.samples > 0.0:
-        elapsed = obs.time - state.time
-        if elapsed > 0.0:
-            raw = (obs.wheel_speed_rear - state.wheel_speed_rear) - (
-                obs.wheel_speed_front - state.wheel_speed_front
-            )
-            share = 1.0
-            if params.difference_time > 0.0:
-                share = -expm1(-elapsed / params.difference_time)
-            state.difference += share * (raw / elapsed - state.difference)
-    state.time = obs.time
-    state.samples += 1.0
+    elapsed = obs.elapsed
+    if elapsed > 0.0:
+        raw = (obs.wheel_speed_rear - state.wheel_speed_rear) - (
+            obs.wheel_speed_front - state.wheel_speed_front
+        )
+        share = 1.0
+        if params.difference_time > 0.0:
+            share = -expm1(-elapsed / params.difference_time)
+        state.difference += share * (raw / elapsed - state.difference)
     state.wheel_speed_front, state.wheel_speed_rear = obs.wheel_speed_front, obs.wheel_speed_rear
     half_total = 0.5 * total_force(obs.accel_x, obs.speed_gps, params)
     half_difference = 0.5 * params.wheel_inertia * state.difference / params.wheel_radius

@@ -15,31 +15,29 @@ Corrected here: the paper gives no gains. Its tables fit a natural frequency of 
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
+from gripbench.compilation import inlined
 from gripbench.methods.blocks.axle_friction import (
     AXLE_FRICTION_PARAMETERS,
     AXLE_FRICTION_STATE,
     AXLE_FRICTION_VEHICLE,
+    MAGIC_FORMULA,
+    PRINTED,
     axle_slips,
     estimate_friction,
     start_friction,
 )
-from gripbench.methods.blocks.rls import MAGIC_FORMULA, PRINTED
 from gripbench.methods.contract import CompiledMethod, Parameter, compiled
-
-_inline = numba.njit(inline="always", error_model="numpy")
 
 _AXLE = ("wheel_speed", "force", "measured", "torque")
 STATE = np.dtype(
-    [("time", np.float64), ("samples", np.float64)]
-    + [(f"{name}_{axle}", np.float64) for axle in ("front", "rear") for name in _AXLE]
+    [(f"{name}_{axle}", np.float64) for axle in ("front", "rear") for name in _AXLE]
     + [(name, np.float64) for name in AXLE_FRICTION_STATE]
 )
 
 
-@_inline
+@inlined
 def observer(wheel_speed, force, measured, torque, elapsed, params):  # type: ignore[no-untyped-def]
     """Return wheel speed and force of an axle after one trapezoidal step of eq. 21.
 
@@ -74,12 +72,11 @@ def start(state, params):  # type: ignore[no-untyped-def]
 @compiled
 def step(state, obs, params, est):  # type: ignore[no-untyped-def]
     """Take one sample: forces by eq. 21, slip by eq. 5, friction by eq. 11-15."""
-    elapsed = 0.0
-    if state.samples == 0.0:
+    elapsed = obs.elapsed
+    if obs.first:
         state.wheel_speed_front = obs.wheel_speed_front
         state.wheel_speed_rear = obs.wheel_speed_rear
     else:
-        elapsed = obs.time - state.time
         state.wheel_speed_front, state.force_front = observer(
             state.wheel_speed_front,
             state.force_front,
@@ -96,8 +93,6 @@ def step(state, obs, params, est):  # type: ignore[no-untyped-def]
             elapsed,
             params,
         )
-    state.time = obs.time
-    state.samples += 1.0
     state.measured_front, state.measured_rear = obs.wheel_speed_front, obs.wheel_speed_rear
     state.torque_front, state.torque_rear = obs.torque_front, obs.torque_rear
     slip_front, slip_rear = axle_slips(

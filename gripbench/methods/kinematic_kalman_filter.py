@@ -62,7 +62,7 @@ KINEMATIC_PARAMETERS = (
     Parameter("turn_hold", 2.0, "s", "How long a turn lasts after the yaw rate has fallen", 0.0),
     Parameter("turn_smoothing", 0.3, "s", "Time constant of the turn detection", 1e-3),
     Parameter("lowest_speed", 2.0, "m/s", "Below it the course is left out", 0.1),
-    Parameter("printed_equations", 0.0, "-", "1: eq. 3 and 4 as printed", 0.0, 1.0),
+    Parameter("printed_equations", False, "-", "Eq. 3 and 4 as printed"),
 )
 
 
@@ -150,7 +150,7 @@ class KinematicKalmanFilter(CompiledMethod):
     estimates = ("sideslip", "yaw", "yaw_rate", "gyro_bias", "gyro_scale")
     variances = ("sideslip", "yaw", "gyro_bias", "gyro_scale")
     parameters = KINEMATIC_PARAMETERS
-    variants = {"paper": {"printed_equations": 1.0}, "scale_factor": {"gyro_scale_std": 0.02}}
+    variants = {"paper": {"printed_equations": True}, "scale_factor": {"gyro_scale_std": 0.02}}
     state = KINEMATIC_STATE
     start = staticmethod(start_kinematic)
     step = staticmethod(_step)

@@ -38,8 +38,6 @@ from gripbench.methods.heading_ekf import (
     wrapped,
 )
 from gripbench.methods.sideslip_kalman_filter import (
-    IGNORE_DELAY,
-    LARSEN,
     SIDESLIP_PARAMETERS,
     SIDESLIP_STATE,
     sideslip_estimate,
@@ -94,13 +92,13 @@ class MagnetometerGpsCascade(CompiledMethod):
     vehicle_parameters = (*HEADING_VEHICLE, *FRICTION_VEHICLE)
     parameters = (*HEADING_PARAMETERS, *SIDESLIP_PARAMETERS, *FRICTION_PARAMETERS)
     variants = {
-        "paper": PRINTED_HEADING | {"printed_15": 1.0, "printed_16": 1.0},
+        "paper": PRINTED_HEADING | {"printed_15": True, "printed_16": True},
         "table_1_noise": TABLE_1_NOISE,
         "pitch_aware": PITCH_AWARE,
         "no_roll_model": NO_ROLL_MODEL,
         "no_rejection": {"gate": UNGATED},
-        "no_delay_handling": {"delay_handling": IGNORE_DELAY},
-        "single_delay": {"delay_handling": LARSEN},
+        "no_delay_handling": {"delay_handling": "ignored"},
+        "single_delay": {"delay_handling": "larsen"},
         "no_bias_states": {"bias_std": 0.0, "bias_walk": 0.0},
     }
     state = CASCADE_STATE
@@ -109,7 +107,7 @@ class MagnetometerGpsCascade(CompiledMethod):
     @property
     def expected_failures(self) -> dict[str, str]:
         """Checks that a variant fails on purpose, with the reason."""
-        if self.settings["delay_handling"] != LARSEN:
+        if self.settings["delay_handling"] != "larsen":
             return {}
         return {
             "variance_not_negative": "a single correction for the delay subtracts more than there "

@@ -32,7 +32,7 @@ from gripbench.methods.blocks.course_history import (
 )
 from gripbench.methods.blocks.discretisation import exponential
 from gripbench.methods.blocks.kalman import correct_scalar, filter_type, predict_covariance
-from gripbench.methods.contract import CompiledMethod, Parameter, compiled
+from gripbench.methods.contract import CompiledMethod, Parameter, Variant, compiled
 
 MODEL_BASED_STATE = np.dtype(
     [
@@ -77,9 +77,7 @@ MODEL_BASED_PARAMETERS = (
     Parameter("bias_std", 1.745e-2, "rad/s", "Standard deviation of the bias at the start", 0.0),
     Parameter("sideslip_std", 1.745e-2, "rad", "Standard deviation of sideslip at the start", 0.0),
     Parameter("lowest_speed", 3.0, "m/s", "Speed below which the model is held at it", 0.5),
-    Parameter(
-        "printed_equations", 0.0, "-", "1: innovation variance of eq. 8 as printed", 0.0, 1.0
-    ),
+    Parameter("printed_equations", False, "-", "Innovation variance of eq. 8 as printed"),
 )
 
 
@@ -278,9 +276,10 @@ class ModelBasedKalmanFilter(CompiledMethod):
     variances = MODEL_BASED_VARIANCES
     vehicle_parameters = SINGLE_TRACK
     parameters = MODEL_BASED_PARAMETERS
-    variants = {"paper": {"printed_equations": 1.0}, "bank": {}}
-    sensors_of = {"bank": (*MODEL_BASED_SENSORS, "road_bank")}
-    steps_of = {"bank": _step_with_bank}
+    variants = {
+        "paper": {"printed_equations": True},
+        "bank": Variant(sensors=(*MODEL_BASED_SENSORS, "road_bank"), step=_step_with_bank),
+    }
     state = MODEL_BASED_STATE
     start = staticmethod(start_model_based)
     step = staticmethod(_step)

@@ -30,35 +30,30 @@ from __future__ import annotations
 
 from math import expm1, sin, sqrt
 
-import numba
 import numpy as np
 
+from gripbench.compilation import inlined
 from gripbench.envs.vehicles import GRAVITY
 from gripbench.methods.blocks.axle_friction import (
     AXLE_FRICTION_PARAMETERS,
     AXLE_FRICTION_STATE,
     AXLE_FRICTION_VEHICLE,
+    PRINTED,
+    RESISTANCE_PARAMETERS,
     axle_slips,
     estimate_friction,
-    start_friction,
-)
-from gripbench.methods.blocks.longitudinal_model import (
-    RESISTANCE_PARAMETERS,
     front_load,
     rear_load,
+    start_friction,
     total_force,
 )
-from gripbench.methods.blocks.rls import PRINTED
-from gripbench.methods.contract import CompiledMethod, Parameter, compiled
+from gripbench.methods.contract import CompiledMethod, Parameter, Variant, compiled
 
 SMALL_SLIP = 1e-5
 """Slip ratio below which the normalised law of the stiffness fades out."""
 
-_inline = numba.njit(inline="always", error_model="numpy")
 
 _NAMES = (
-    "time",
-    "samples",
     "speed",
     "accel_x",
     "stiffness",
@@ -70,7 +65,7 @@ _NAMES = (
 STATE = np.dtype([(name, np.float64) for name in _NAMES])
 
 
-@_inline
+@inlined
 def observed_speed(  # type: ignore[no-untyped-def]
     speed, torque, wheel_acceleration, accel_x, mean_accel_x, grade, elapsed, params
 ):
@@ -104,7 +99,7 @@ def observed_speed(  # type: ignore[no-untyped-def]
     return 2.0 * linear / (1.0 + sqrt(1.0 + 4.0 * quadratic * linear))
 
 
-@_inline
+@inlined
 def adapted_stiffness(stiffness, slip, force, elapsed, params):  # type: ignore[no-untyped-def]
     """Return k [N] after one backward Euler step of k_dot = -K_e sign(s) (k s - F).
 
@@ -141,9 +136,9 @@ def start(state, params):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _step(state, obs, wheel_acceleration, slip_speed, elapsed, params, est):  # type: ignore[no-untyped-def]
+def _step(state, obs, wheel_acceleration, slip_speed, params, est):  # type: ignore[no-untyped-def]
     torque = obs.torque_front + obs.torque_rear
-    if state.samples == 0.0:
+    if obs.first:
         state.speed = params.wheel_radius * obs.wheel_speed_front
     else:
         state.speed = observed_speed(
@@ -153,11 +148,9 @@ def _step(state, obs, wheel_acceleration, slip_speed, elapsed, params, est):  # 
             obs.accel_x,
             0.5 * (state.accel_x + obs.accel_x),
             obs.road_grade,
-            elapsed,
+            obs.elapsed,
             params,
         )
-    state.time = obs.time
-    state.samples += 1.0
     state.accel_x = obs.accel_x
     state.wheel_speed_front, state.wheel_speed_rear = obs.wheel_speed_front, obs.wheel_speed_rear
     speed = slip_speed if slip_speed >= 0.0 else state.speed
@@ -165,45 +158,41 @@ def _step(state, obs, wheel_acceleration, slip_speed, elapsed, params, est):  # 
     share = rear_load(params) / front_load(params)
     force = total_force(obs.accel_x, speed, params)
     state.stiffness = adapted_stiffness(
-        state.stiffness, slip_front + share * slip_rear, force, elapsed, params
+        state.stiffness, slip_front + share * slip_rear, force, obs.elapsed, params
     )
     est.speed_x = state.speed
     est.force_x_front = state.stiffness * slip_front
     est.force_x_rear = state.stiffness * share * slip_rear
-    estimate_friction(state, est, slip_front, slip_rear, elapsed, params)
+    estimate_friction(state, est, slip_front, slip_rear, obs.elapsed, params)
 
 
 @compiled
 def step(state, obs, params, est):  # type: ignore[no-untyped-def]
     """Take one sample; the wheel accelerations are differences of the wheel speeds."""
-    elapsed = 0.0
-    if state.samples > 0.0:
-        elapsed = obs.time - state.time
-        if elapsed > 0.0:
-            rise = (obs.wheel_speed_front - state.wheel_speed_front) + (
-                obs.wheel_speed_rear - state.wheel_speed_rear
-            )
-            share = 1.0
-            if params.difference_time > 0.0:
-                share = -expm1(-elapsed / params.difference_time)
-            state.wheel_acceleration += share * (rise / elapsed - state.wheel_acceleration)
-    _step(state, obs, state.wheel_acceleration, -1.0, elapsed, params, est)
+    elapsed = obs.elapsed
+    if elapsed > 0.0:
+        rise = (obs.wheel_speed_front - state.wheel_speed_front) + (
+            obs.wheel_speed_rear - state.wheel_speed_rear
+        )
+        share = 1.0
+        if params.difference_time > 0.0:
+            share = -expm1(-elapsed / params.difference_time)
+        state.wheel_acceleration += share * (rise / elapsed - state.wheel_acceleration)
+    _step(state, obs, state.wheel_acceleration, -1.0, params, est)
 
 
 @compiled
 def step_idealised(state, obs, params, est):  # type: ignore[no-untyped-def]
     """Take one sample with the model's own wheel accelerations, as the paper does."""
-    elapsed = obs.time - state.time if state.samples > 0.0 else 0.0
     acceleration = obs.wheel_acceleration_front + obs.wheel_acceleration_rear
-    _step(state, obs, acceleration, -1.0, elapsed, params, est)
+    _step(state, obs, acceleration, -1.0, params, est)
 
 
 @compiled
 def step_gps(state, obs, params, est):  # type: ignore[no-untyped-def]
     """Take one sample with the GPS speed in the slip: the remark for a noisy accelerometer."""
-    elapsed = obs.time - state.time if state.samples > 0.0 else 0.0
     acceleration = obs.wheel_acceleration_front + obs.wheel_acceleration_rear
-    _step(state, obs, acceleration, obs.speed_gps, elapsed, params, est)
+    _step(state, obs, acceleration, obs.speed_gps, params, est)
 
 
 _SENSORS = (
@@ -237,22 +226,18 @@ class ProposedObserver(CompiledMethod):
         *AXLE_FRICTION_PARAMETERS,
         Parameter("velocity_gain", 30.0, "-", "Gain K_a of eq. 24", 0.0),
         Parameter("stiffness_gain", 8e4, "1/s", "Gain K_e of Figure 19", 0.0),
-        Parameter(
-            "normalised", 0.0, "-", "1: the stiffness' error is taken over the slip", 0.0, 1.0
-        ),
+        Parameter("normalised", False, "-", "The stiffness' error is taken over the slip"),
         Parameter("difference_time", 0.05, "s", "Low-pass of the differenced wheel speeds", 0.0),
     )
     variants = {
-        "paper": _PAPER,
-        "paper_noise": _PAPER | {"stiffness_gain": 140.0, "normalised": 1.0},
-        "idealised": {"velocity_gain": 8e5},
+        "paper": Variant(_PAPER, _IDEALISED, step_idealised),
+        "paper_noise": Variant(
+            _PAPER | {"stiffness_gain": 140.0, "normalised": True},
+            (*_IDEALISED, "speed_gps"),
+            step_gps,
+        ),
+        "idealised": Variant({"velocity_gain": 8e5}, _IDEALISED, step_idealised),
     }
-    sensors_of = {
-        "paper": _IDEALISED,
-        "paper_noise": (*_IDEALISED, "speed_gps"),
-        "idealised": _IDEALISED,
-    }
-    steps_of = {"paper": step_idealised, "paper_noise": step_gps, "idealised": step_idealised}
     state = STATE
     start = staticmethod(start)
     step = staticmethod(step)

@@ -14,8 +14,8 @@ moves it forward through the recorded inputs, corrects it where the measurement 
 copy replays the inputs since then to the present. That is exact for any number of measurements
 in flight. The measurement shifting of Larsen et al. (1998), which the paper cites, carries one
 gain to the present and is exact for a single measurement in flight only; here it diverges
-(`delay_handling = 2`). A sample that is repeated, older than the last one taken, from the future
-or older than the recorded inputs is left out and counted.
+(`delay_handling = "larsen"`). A sample that is repeated, older than the last one taken, from the
+future or older than the recorded inputs is left out and counted.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from gripbench.methods.blocks.kalman import correct_scalar, filter_type, predict
 from gripbench.methods.contract import Parameter, compiled
 
 IGNORE_DELAY, REPLAY, LARSEN = 0.0, 1.0, 2.0
-"""Values of the parameter `delay_handling`."""
+"""The choices of the parameter `delay_handling`, as the step sees them."""
 
 _HISTORY = 1024
 _TIME, _ACCEL_X, _ACCEL_Y, _YAW_RATE, _YAW, _ROLL, _YAW_VARIANCE = range(7)
@@ -58,8 +58,8 @@ SIDESLIP_PARAMETERS = (
         "Share of the heading's standard deviation that differs from sample to sample", 0.0, 1.0,
     ),
     Parameter(
-        "delay_handling", REPLAY, "-", "0: delay ignored, 1: replay, 2: Larsen's shifting",
-        IGNORE_DELAY, LARSEN,
+        "delay_handling", "replay", "-", "What becomes of the age of a GPS sample",
+        choices=("ignored", "replay", "larsen"),
     ),
 )  # fmt: skip
 

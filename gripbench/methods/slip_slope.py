@@ -14,28 +14,26 @@ from __future__ import annotations
 import numpy as np
 
 from gripbench.envs.tyres.longitudinal import slip_ratio
-from gripbench.methods.blocks.longitudinal_model import (
+from gripbench.methods.blocks.axle_friction import (
     AXLE_LOAD_PARAMETERS,
-    RESISTANCE_PARAMETERS,
-    TYRE_PARAMETERS,
-    front_load,
-    rear_load,
-    total_force,
-)
-from gripbench.methods.blocks.rls import (
     FRICTION_MAP_PARAMETERS,
     MAGIC_FORMULA,
     PRINTED,
+    RESISTANCE_PARAMETERS,
     RLS_PARAMETERS,
+    TYRE_PARAMETERS,
     excited,
     forgetting_factor,
     friction_of_slope,
+    front_load,
+    rear_load,
     rls,
     slip_regressor,
+    total_force,
 )
 from gripbench.methods.contract import CompiledMethod, Parameter, compiled
 
-STATE = np.dtype([(name, np.float64) for name in ("time", "samples", "slope", "covariance", "mu")])
+STATE = np.dtype([(name, np.float64) for name in ("slope", "covariance", "mu")])
 
 
 @compiled
@@ -48,9 +46,6 @@ def start(state, params):  # type: ignore[no-untyped-def]
 @compiled
 def step(state, obs, params, est):  # type: ignore[no-untyped-def]
     """Take one sample: total force by eq. 8, slip slope by eq. 10-14, friction by eq. 15."""
-    elapsed = obs.time - state.time if state.samples > 0.0 else 0.0
-    state.time = obs.time
-    state.samples += 1.0
     slip_front = slip_ratio(params.wheel_radius * obs.wheel_speed_front, obs.speed_gps)
     slip_rear = slip_ratio(params.wheel_radius * obs.wheel_speed_rear, obs.speed_gps)
     force = total_force(obs.accel_x, obs.speed_gps, params)
@@ -62,7 +57,7 @@ def step(state, obs, params, est):  # type: ignore[no-untyped-def]
     elif excited(0.5 * force, params):
         regressor = load_front * slip_regressor(slip_front, params)
         regressor += load_rear * slip_regressor(slip_rear, params)
-        forgetting = forgetting_factor(params, elapsed)
+        forgetting = forgetting_factor(params, obs.elapsed)
         state.slope, state.covariance = rls(
             state.slope, state.covariance, regressor, force, forgetting
         )

@@ -58,8 +58,10 @@ def plain_python(method, observations):
     """Return the estimates of a method whose step runs uncompiled over records."""
     records = method._fresh(CAR, len(observations))
     chosen = np.zeros(len(observations), records.obs.dtype)
-    for name in chosen.dtype.names:
+    for name in (*method.sensors, "time"):
         chosen[name] = observations[name]
+    chosen["elapsed"] = np.diff(observations["time"], prepend=observations["time"][0])
+    chosen["first"][0] = 1.0
     rows, state, params, est = (
         array.view(np.recarray) for array in (chosen, records.state, records.params, records.est)
     )

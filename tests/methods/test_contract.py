@@ -14,7 +14,7 @@ from longitudinal_samples import (
 
 from gripbench.envs.signals import signal
 from gripbench.errors import GripbenchError, InputError, UndeclaredChannelError
-from gripbench.methods.contract import CompiledMethod, Estimator, Parameter, compiled
+from gripbench.methods.contract import CompiledMethod, Estimator, Parameter, Variant, compiled
 from gripbench.methods.slip_slope import SlipSlope
 
 STATE = np.dtype([("last", np.float64)])
@@ -59,7 +59,12 @@ def _method(step):
         sensors = ("accel_x",)
         estimates = ("force_x_front",)
         vehicle_parameters = ("mass",)
-        parameters = (Parameter("share", 0.5, "-", "Share", 0.0, 1.0),)
+        parameters = (
+            Parameter("share", 0.5, "-", "Share", 0.0, 1.0),
+            Parameter("switch", False, "-", "Switch"),
+            Parameter("count", 3, "-", "Whole number", 1, 9),
+            Parameter("form", "long", "-", "Choice", choices=("short", "long")),
+        )
         variants = {"whole": {"share": 1.0}}
         state = STATE
 
@@ -121,11 +126,49 @@ def test_missing_vehicle_parameter_is_named():
         ("corrected", {"share": 1.5}, "'share' is 1.5; allowed is 0 to 1 -"),
         ("corrected", {"share": float("nan")}, "'share' is nan"),
         ("corrected", {"share": "half"}, "'share' is 'half'"),
+        ("corrected", {"share": True}, "'share' is True"),
+        ("corrected", {"switch": 0.5}, "'switch' is 0.5; it is a switch"),
+        ("corrected", {"count": 2.5}, "'count' is 2.5; it is a whole number"),
+        ("corrected", {"count": 10}, "'count' is 10; allowed is 1 to 9"),
+        ("corrected", {"form": "longer"}, "'form' is 'longer'; allowed is one of short, long"),
+        ("corrected", {"form": 2.0}, "'form' is 2.0; allowed is one of short, long"),
     ],
 )
 def test_settings_are_checked(variant, overrides, message):
     with pytest.raises(InputError, match=message):
         _method(_good)(variant, **overrides)
+
+
+def test_settings_keep_their_types_and_steps_see_numbers():
+    method = _method(_good)(switch=1.0, count=4.0, form=0.0)
+    assert method.settings == {"share": 0.5, "switch": True, "count": 4, "form": "short"}
+    params = method._fresh(CAR, 1).params[0]
+    assert (params["switch"], params["count"], params["form"]) == (1.0, 4.0, 0.0)
+    assert method.variants["whole"] == Variant({"share": 1.0})
+
+
+@compiled
+def _clock(state, obs, params, est):
+    state.last += obs.elapsed
+    est.force_x_front = state.last + 1000.0 * obs.first
+
+
+@pytest.mark.parametrize(
+    ("times", "expected"),
+    [
+        ([1.0, 1.5, 1.75], [1000.0, 0.5, 0.75]),
+        ([1.0, 1.5, 1.25, 1.5], [1000.0, 0.5, 0.5, 0.75]),  # the clock steps back
+        ([1.0, np.nan, 1.5, 1.5], [1000.0, 0.0, 0.5, 0.5]),  # a time is missing
+        ([np.nan, 2.0, np.inf, 2.5], [1000.0, 1000.0, 0.0, 0.5]),
+    ],
+)
+def test_the_driver_gives_the_elapsed_time(times, expected):
+    method = _method(_clock)()
+    observations = np.zeros(len(times), [("time", float), ("accel_x", float)])
+    observations["time"] = times
+    batch = method.run(CAR, observations)
+    np.testing.assert_allclose(batch["force_x_front"], expected)
+    assert online(method, observations).tobytes() == batch.tobytes()
 
 
 def test_parameter_that_the_vehicle_has_too():

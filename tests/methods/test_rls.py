@@ -14,7 +14,7 @@ from longitudinal_samples import (
     weighted_least_squares,
 )
 
-from gripbench.methods.blocks.rls import forgetting_factor, rls
+from gripbench.methods.blocks.axle_friction import forgetting_factor, rls
 from gripbench.methods.individual_wheel_acceleration import IndividualWheelAcceleration
 from gripbench.methods.slip_slope import SlipSlope
 
@@ -89,7 +89,7 @@ def test_slip_slope_is_least_squares_of_force_on_slip():
 
 def test_memory_and_excitation_gate_in_a_method():
     obs = unequal(recording("constant_mu", 0.9).observations)
-    estimates = SlipSlope(memory_time=0.2, excitation_force=60.0, tyre_shape=0.0).run(CAR, obs)
+    estimates = SlipSlope(memory_time=0.2, excitation_force=60.0, tyre_shape=False).run(CAR, obs)
     force = _total_force(obs)
     used = np.abs(0.5 * force) >= 60.0
     front, rear = slip_ratios(obs)
@@ -97,7 +97,8 @@ def test_memory_and_excitation_gate_in_a_method():
     factors = np.exp(-np.diff(obs["time"], prepend=obs["time"][0]) / 0.2)[used]
     settings = SlipSlope().settings
     slope = weighted_least_squares(regressor, force[used], factors, settings["covariance"])
-    expected = settings["slope_gain"] * slope + settings["slope_offset"]
+    gain = 1.0 / (CAR["magic_b"] * CAR["magic_c"])
+    expected = gain * slope + settings["slope_offset"]
     np.testing.assert_allclose(estimates["mu_front"][used], expected, rtol=1e-6)
     assert 0 < used.sum() < len(obs)
     idle = np.flatnonzero(~used)

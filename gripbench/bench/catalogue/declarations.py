@@ -34,6 +34,7 @@ class Declaration:
     variant: str
     settings: dict[str, float | str | bool | None]
     file: str
+    baseline: bool = False
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -154,6 +155,7 @@ def declaration_of(
         variant=method.variant if compiled else variant,
         settings=dict(method.settings) if compiled else dict(parameters),
         file=str(getattr(module, "__file__", None) or ""),
+        baseline=bool(getattr(method, "baseline", False)),
     )
 
 
@@ -161,7 +163,8 @@ def _names(method: Any, name: str, attribute: str, required: bool = False) -> tu
     value = getattr(method, attribute, None)
     if value is None and not required:
         return ()
-    if isinstance(value, str) or not isinstance(value, list | tuple) or (required and not value):
+    empty = required and not value and attribute != "sensors"  # a constant reads nothing
+    if isinstance(value, str) or not isinstance(value, list | tuple) or empty:
         raise InputError(
             f"{name}: set the class attribute '{attribute}' to a tuple of signal names, such as "
             f"('accel_x',) (it is {value!r})"

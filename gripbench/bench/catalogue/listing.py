@@ -89,7 +89,11 @@ def _with_sensor_variants() -> list[tuple[str, CompiledMethod]]:
     found = []
     for name, method in built_in_methods().items():
         found.append((name, method()))
-        found += [(f"{name}:{variant}", method(variant)) for variant in method.sensors_of]
+        found += [
+            (f"{name}:{variant}", method(variant))
+            for variant, changes in method.variants.items()
+            if changes.sensors is not None
+        ]
     return found
 
 
@@ -124,11 +128,14 @@ def _method(name: str) -> dict[str, Any]:
                 "unit": item.unit,
                 "low": item.low if abs(item.low) != float("inf") else None,
                 "high": item.high if abs(item.high) != float("inf") else None,
+                "choices": list(item.choices),
                 "description": item.description,
             }
             for item in built_in.parameters
         }
-        content["variants"] = {key: dict(value) for key, value in built_in.variants.items()}
+        content["variants"] = {
+            key: dict(value.settings) for key, value in built_in.variants.items()
+        }
     return content
 
 

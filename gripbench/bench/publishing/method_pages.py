@@ -15,7 +15,7 @@ from gripbench.bench.publishing.tables import Column, Table, markdown
 from gripbench.bench.ranking.summary import FOOTNOTE, MARK
 from gripbench.bench.running.rows import pooled_rms
 from gripbench.envs.signals import signal
-from gripbench.methods.contract import CompiledMethod
+from gripbench.methods.contract import CompiledMethod, Parameter
 
 FAILS = 3.0
 """A method fails in a scenario where its RMS is this many times that of the scenario's best."""
@@ -161,10 +161,19 @@ def _entry(method: type[CompiledMethod], published: Leaderboard | None) -> str:
 
 def _parameters(method: type[CompiledMethod]) -> Table:
     columns = (
-        Column("name", "Parameter"), Column("default", "Default", format=".6g"),
+        Column("name", "Parameter"), Column("default", "Default"),
         Column("unit", "Unit"), Column("description", "Description"),
     )  # fmt: skip
-    return Table(columns, tuple(vars(item) for item in method.parameters))
+    return Table(
+        columns, tuple(vars(item) | {"default": _shown(item)} for item in method.parameters)
+    )
+
+
+def _shown(parameter: Parameter) -> str:
+    """Return a default as it is read: a switch as yes or no."""
+    if parameter.is_switch:
+        return "yes" if parameter.default else "no"
+    return parameter.default if isinstance(parameter.default, str) else f"{parameter.default:.6g}"
 
 
 def _indented(text: str) -> str:

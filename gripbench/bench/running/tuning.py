@@ -97,6 +97,7 @@ def tune(
         parameter.name: parameter
         for parameter in methods[name].parameters
         if parameter.name.endswith(NOISE_LEVELS)
+        and isinstance(parameter.default, float)
         and parameter.default > 0.0
         and parameter.name not in known
     }

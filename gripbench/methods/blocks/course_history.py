@@ -12,7 +12,7 @@ from math import pi
 
 import numpy as np
 
-from gripbench.methods.blocks.kalman import compiled_step
+from gripbench.compilation import compiled
 
 _LENGTH = 256
 _SPACING = 0.005  # [s] between entries at most: 1.28 s at least are kept
@@ -29,13 +29,13 @@ HISTORY = np.dtype(
 """A ring of times and predicted courses; all zero is empty."""
 
 
-@compiled_step
+@compiled
 def wrapped(angle):  # type: ignore[no-untyped-def]
     """Return an angle within -pi to pi."""
     return angle - 2.0 * pi * np.floor((angle + pi) / (2.0 * pi))
 
 
-@compiled_step
+@compiled
 def remember(history, time, value):  # type: ignore[no-untyped-def]
     """Add the predicted course (unwrapped) at a time; times must not decrease."""
     count = int(history.count)
@@ -46,7 +46,7 @@ def remember(history, time, value):  # type: ignore[no-untyped-def]
     history.count = count + 1.0
 
 
-@compiled_step
+@compiled
 def is_usable(history, sample_time):  # type: ignore[no-untyped-def]
     """Return whether a sample is newer than all before and within the history; note its time."""
     count = int(history.count)
@@ -65,7 +65,7 @@ def is_usable(history, sample_time):  # type: ignore[no-untyped-def]
     return True
 
 
-@compiled_step
+@compiled
 def change_since(history, sample_time):  # type: ignore[no-untyped-def]
     """Return the predicted change of course since a time within the history."""
     newest = int(history.count) - 1

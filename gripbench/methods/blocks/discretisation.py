@@ -6,12 +6,12 @@ the input matrix beside it (Franklin, Powell & Workman, Digital Control, 4.3).
 
 from __future__ import annotations
 
-from gripbench.methods.blocks.kalman import compiled_step
+from gripbench.compilation import compiled
 
 _TERMS = 10  # of the series; exact to rounding for a norm below 1/8
 
 
-@compiled_step
+@compiled
 def exponential(M, E, work):  # type: ignore[no-untyped-def]
     """Fill `E` with exp(M): series of a halved matrix, squared back; `M` is overwritten.
 

@@ -11,10 +11,10 @@ from __future__ import annotations
 
 from math import sqrt
 
-from gripbench.methods.blocks.kalman import compiled_step
+from gripbench.compilation import compiled
 
 
-@compiled_step
+@compiled
 def dugoff_slips(rolling, speed, lateral, printed):  # type: ignore[no-untyped-def]
     """Return lambda/(1 - |lambda|), tan(alpha)/(1 - |lambda|) and their slopes.
 
@@ -53,7 +53,7 @@ def dugoff_slips(rolling, speed, lateral, printed):  # type: ignore[no-untyped-d
     return (rolling - speed) / rolling, -lateral / rolling, -1.0 / rolling, 0.0, -1.0 / rolling
 
 
-@compiled_step
+@compiled
 def dugoff_force(linear_x, linear_y, capacity):  # type: ignore[no-untyped-def]
     """Return F_x, F_y [N] and the slopes dF_x/dg_x, dF_x/dg_y (= dF_y/dg_x), dF_y/dg_y.
 

@@ -21,8 +21,9 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba
 import numpy as np
+
+from gripbench.compilation import compiled
 
 
 def filter_type(states: int, outputs: int = 0) -> np.dtype[Any]:
@@ -67,12 +68,7 @@ def filter_type(states: int, outputs: int = 0) -> np.dtype[Any]:
     return np.dtype(fields)
 
 
-def compiled_step(function: Any) -> Any:
-    """Compile a filter function; it is inlined into the methods' steps."""
-    return numba.njit(cache=True, error_model="numpy", nogil=True)(function)
-
-
-@compiled_step
+@compiled
 def predict_covariance(filter):  # type: ignore[no-untyped-def]
     """Advance the covariance by one step, P = F P F' + Q; an EKF advances `x` itself."""
     n = filter.x.shape[0]
@@ -92,7 +88,7 @@ def predict_covariance(filter):  # type: ignore[no-untyped-def]
             P[j, i] = total
 
 
-@compiled_step
+@compiled
 def predict(filter):  # type: ignore[no-untyped-def]
     """Advance mean and covariance by one step, x = F x; inputs are the caller's to add."""
     n = filter.x.shape[0]
@@ -107,7 +103,7 @@ def predict(filter):  # type: ignore[no-untyped-def]
     predict_covariance(filter)
 
 
-@compiled_step
+@compiled
 def correct_scalar(filter, residual, variance):  # type: ignore[no-untyped-def]
     """Take one measurement with row `h`; return its normalised innovation squared.
 
@@ -144,7 +140,7 @@ def correct_scalar(filter, residual, variance):  # type: ignore[no-untyped-def]
     return residual * residual / s
 
 
-@compiled_step
+@compiled
 def innovation_distance(filter):  # type: ignore[no-untyped-def]
     """Return d^2 = residual' S^-1 residual of the measurements with `H`, `R` and `residual`.
 
@@ -189,7 +185,7 @@ def innovation_distance(filter):  # type: ignore[no-untyped-def]
     return distance
 
 
-@compiled_step
+@compiled
 def correct(filter):  # type: ignore[no-untyped-def]
     """Take the measurements for which `innovation_distance` was called last."""
     n = filter.x.shape[0]

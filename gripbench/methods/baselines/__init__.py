@@ -1,0 +1,1 @@
+"""Trivial estimators through the same contract: what every other method has to beat."""
