@@ -129,5 +129,7 @@ def dugoff_observability(
 
 def _parameters(vehicle: Mapping[str, float]) -> Any:
     values = require(dict(vehicle), DugoffEkf.vehicle_parameters, "dugoff_observability")
-    values |= {parameter.name: parameter.number(parameter.default) for parameter in DUGOFF_PARAMETERS}
+    values |= {
+        parameter.name: parameter.number(parameter.default) for parameter in DUGOFF_PARAMETERS
+    }
     return np.array([tuple(values.values())], [(name, np.float64) for name in values])[0]
