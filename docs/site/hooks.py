@@ -11,6 +11,7 @@ from typing import Any
 from latex2mathml.converter import convert
 from mkdocs.structure.files import File, Files
 
+from gripbench.bench.publishing.equation_pages import equations_page
 from gripbench.bench.publishing.method_pages import catalogue_page
 
 ROOT = Path(__file__).parents[2]
@@ -19,9 +20,10 @@ _FORMULA = re.compile(r'<(span|div) class="arithmatex">\\([(\[])(.*?)\\[)\]]</\1
 
 
 def on_files(files: Files, config: Any) -> Files:
-    """Add the catalogue of methods, made from the code and the published leaderboard."""
+    """Add the pages that are made from the code: the catalogue of methods, and the equations."""
     text = catalogue_page(ROOT / "results")
     files.append(File.generated(config, "methods.md", content=text))
+    files.append(File.generated(config, "equations.md", content=equations_page()))
     return files
 
 
