@@ -40,7 +40,7 @@ def test_paper_solver_has_no_environment():
 
 @pytest.mark.parametrize("name", ONE_OF_EACH_WORLD)
 def test_stepping_gives_the_bytes_of_the_batch_rollout(name):
-    environment = VehicleEnvironment(name)
+    environment = VehicleEnvironment(name, idealised=True)
     steps = 1500
     recording = record(load_scenario(name), 3)
     observation, info = environment.reset(seed=3)

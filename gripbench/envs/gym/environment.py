@@ -19,40 +19,12 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium import spaces
 
-from gripbench.envs.instruments.sensors import SensorSuite
-from gripbench.envs.plants.simulation import Action
-from gripbench.envs.signals import NEW, signal
-from gripbench.envs.worlds import load_scenario, simulation_of
-from gripbench.errors import InputError
+from gripbench.envs.gym.arguments import ArgumentError, NotResetError, action_rows, integer
+from gripbench.envs.gym.episodes import Episodes, observation_space
+from gripbench.envs.gym.rendering import RENDER_MODES, TopView, checked_mode
+from gripbench.envs.plants.simulation import Action, Simulation
 
 Observation = dict[str, npt.NDArray[np.float64]]
-
-_LARGEST = {
-    "s": 1e5,
-    "m": 1e6,
-    "m/s": 1e3,
-    "m/s^2": 1e6,
-    "rad": 1e2,
-    "rad/s": 1e5,
-    "rad/s^2": 1e8,
-    "N": 1e7,
-    "N m": 1e6,
-    "T": 1.0,
-    "-": 1e3,
-}
-"""Bounds of observations by unit: far beyond a vehicle, but finite, as Gymnasium asks."""
-
-
-def observation_space(channels: tuple[str, ...]) -> spaces.Dict:
-    """Return the space of a dict of scalar channels."""
-    boxes: dict[str, spaces.Space[Any]] = {}
-    for name in channels:
-        if name.endswith(NEW):
-            boxes[name] = spaces.Box(0.0, 1.0, (), np.float64)
-        else:
-            bound = _LARGEST[signal(name).unit]
-            boxes[name] = spaces.Box(-bound, bound, (), np.float64)
-    return spaces.Dict(boxes)
 
 
 @dataclass(frozen=True)
@@ -78,12 +50,9 @@ class ActionMap:
 
     def inputs(self, action: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Return the plant's inputs within their range, shape (..., inputs)."""
-        given = np.asarray(action, np.float64)
-        if given.shape[-1:] != self.scale.shape:
-            raise InputError(f"the action's shape is {given.shape}; its last is {self.scale.size}")
-        if not np.isfinite(given).all():
-            raise InputError(f"the action {action} is not finite")
-        return np.clip(given * self.scale, self.low, self.high)
+        if not np.isfinite(action).all():
+            raise ArgumentError(f"the action {action} is not finite")
+        return np.clip(action * self.scale, self.low, self.high)
 
     def action(self, inputs: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Return the action that gives the inputs, shape (..., inputs)."""
@@ -96,6 +65,11 @@ class ActionMap:
         return -0.5 * np.mean(np.abs(inputs - driver) / self.scale, axis=-1)
 
 
+def seeded(seed: Any) -> int | None:
+    """Return the seed of one environment as Gymnasium wants it."""
+    return None if seed is None else integer(seed, "seed", 0)
+
+
 class VehicleEnvironment(gymnasium.Env[Observation, npt.NDArray[np.float64]]):
     """One vehicle in one scenario.
 
@@ -103,30 +77,54 @@ class VehicleEnvironment(gymnasium.Env[Observation, npt.NDArray[np.float64]]):
     ----------
     scenario
         Name of a scenario that ships, or path of its TOML file.
+    render_mode
+        `rgb_array`, `human` or None, see `gripbench.envs.gym.rendering`.
+    idealised
+        Whether observations also hold the scenario's channels that no sensor in a vehicle gives.
     """
 
-    metadata: dict[str, Any] = {"render_modes": []}
+    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 100}
 
-    def __init__(self, scenario: str) -> None:
-        self.scenario = load_scenario(scenario)
-        self.simulation = simulation_of(self.scenario)
-        self._sensors = self.scenario.all_sensors()
-        suite = self._suite(0)
-        self._channels = suite.observation_type.names or ()
-        self.observation_space: spaces.Space[Any] = observation_space(self._channels)
+    def __init__(
+        self, scenario: str, render_mode: str | None = None, idealised: bool = False
+    ) -> None:
+        self._episodes = Episodes(scenario, idealised)
+        self.scenario = self._episodes.scenario
+        self.simulation: Simulation = self._episodes.simulation()
+        self._own_simulation = self.simulation
+        self.observation_space: spaces.Space[Any] = observation_space(self._episodes.channels)
         self.action_map = ActionMap.of(self.simulation.actions)
         self.action_space: spaces.Space[Any] = self.action_map.space
+        self.render_mode = checked_mode(render_mode)
+        self.metadata = {**type(self).metadata, "render_fps": 1.0 / self.scenario.sample_time}
+        self._view = TopView(self.scenario, self.render_mode) if self.render_mode else None
         self._steps = 0
+        self._going = False
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Start a run; without a seed, one is drawn from the environment's own stream."""
+        """Start an episode; without a seed, one is drawn from the environment's own stream.
+
+        Parameters
+        ----------
+        seed
+            Seed of all randomness of the episode, and of the stream for later ones.
+        options
+            What this episode changes of the scenario, see `gripbench.envs.gym.arguments.OPTIONS`.
+        """
+        seed = seeded(seed)
+        changed = self._episodes.changed(options) is not self._episodes.scenario
         super().reset(seed=seed)
         run = seed if seed is not None else int(self.np_random.integers(2**31))
+        self.simulation = self._episodes.simulation(options) if changed else self._own_simulation
         self._steps = 0
-        self._measuring = self._suite(run)
-        return self._sample(self.simulation.reset(run))
+        self._going = True
+        self._measuring = self._episodes.suite(self.simulation, run)
+        truth = self.simulation.reset(run)
+        if self._view is not None:
+            self._view.begin(truth[0], self.simulation.path())
+        return self._sample(truth)
 
     def step(
         self, action: npt.NDArray[np.float64]
@@ -138,27 +136,42 @@ class VehicleEnvironment(gymnasium.Env[Observation, npt.NDArray[np.float64]]):
         action
             Shape (inputs,), each -1 to 1, clipped to the inputs' ranges.
         """
-        inputs = self.action_map.inputs(action)
+        if not self._going:
+            started = self._steps > 0
+            raise NotResetError(
+                "the episode has ended: call reset" if started else "call reset before step"
+            )
+        inputs = self.action_map.inputs(action_rows(action, self.action_map.scale.shape))
         reward = float(self.action_map.reward(inputs, self.simulation.drive()))
-        observation, info = self._sample(self.simulation.advance(inputs))
+        truth = self.simulation.advance(inputs)
         self._steps += 1
         ended = bool(self.simulation.termination)
-        return observation, reward, ended, self._steps >= self.scenario.steps and not ended, info
+        truncated = self._steps >= self.scenario.steps and not ended
+        self._going = not (ended or truncated)
+        if self._view is not None and self.simulation.termination != "diverged":
+            self._view.follow(truth[0], self.simulation.termination)
+        observation, info = self._sample(truth)
+        return observation, reward, ended, truncated, info
+
+    def render(self) -> Any:
+        """Return a frame, shape (height, width, 3), in `rgb_array`; None in other modes."""
+        return None if self._view is None else self._view.render()
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._view is not None:
+            self._view.close()
 
     def driver_action(self) -> npt.NDArray[np.float64]:
         """Return the action of the scenario's own driver, shape (inputs,)."""
+        if not self._going:
+            raise NotResetError("call reset before driver_action")
         return self.action_map.action(self.simulation.drive())
 
-    def _suite(self, seed: int) -> SensorSuite:
-        simulation = self.simulation
-        return SensorSuite(self._sensors, simulation.truth_type, simulation.sample_time, seed)
-
     def _sample(self, truth: npt.NDArray[Any]) -> tuple[Observation, dict[str, Any]]:
-        observed = self._measuring.observe(truth)[0]
-        observation = {name: np.array(observed[name]) for name in self._channels}
-        names = truth.dtype.names or ()
+        observation = self._episodes.observation(self._measuring.observe(truth)[0])
         info = {
-            "truth": dict(zip(names, truth[0].item(), strict=True)),
+            "truth": dict(zip(truth.dtype.names or (), truth[0].item(), strict=True)),
             "termination": self.simulation.termination,
         }
         return observation, info

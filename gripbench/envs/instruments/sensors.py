@@ -290,24 +290,31 @@ class SensorLanes:
         self._suites[lane] = suite
         self._adopt(lane, suite)
 
-    def observe(self, truth: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    def observe(
+        self, truth: npt.NDArray[Any], lanes: npt.NDArray[np.intp] | None = None
+    ) -> npt.NDArray[Any]:
         """Measure the next sample of each lane.
 
         Parameters
         ----------
         truth
             Structured array, shape (lanes,).
+        lanes
+            Numbers of the lanes that have a next sample; all unless given. The others' rows of
+            the result are zero.
 
         Returns
         -------
         Structured array, shape (lanes,), of `observation_type`.
         """
-        for lane in np.flatnonzero(self._samples % _CHUNK == 0):
+        if lanes is None:
+            lanes = np.arange(len(truth))
+        for lane in lanes[self._samples[lanes] % _CHUNK == 0]:
             self._suites[lane]._draw()
-        observations = np.empty(len(truth), self.observation_type)
+        observations = np.zeros(len(truth), self.observation_type)
         stacks = [self._stacks[name] for name in _LANE_ARRAYS]
-        _measure_lanes(self._samples, _as_matrix(truth), *stacks, _as_matrix(observations))
-        self._samples += 1
+        _measure_lanes(lanes, self._samples, _as_matrix(truth), *stacks, _as_matrix(observations))
+        self._samples[lanes] += 1
         return observations
 
     def _adopt(self, lane: int, suite: SensorSuite) -> None:
@@ -320,8 +327,8 @@ _LANE_ARRAYS = ("_specs", "_states", "_history", "_noise", "_walk")
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
-def _measure_lanes(samples, truth, specs, states, history, noise, walk, out):  # type: ignore[no-untyped-def]
-    for lane in range(truth.shape[0]):
+def _measure_lanes(lanes, samples, truth, specs, states, history, noise, walk, out):  # type: ignore[no-untyped-def]
+    for lane in lanes:
         k = samples[lane]
         at = k % noise.shape[1]
         _measure(

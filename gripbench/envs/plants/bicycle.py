@@ -30,6 +30,7 @@ from gripbench.envs.plants.planar.run import (
     TERMINATIONS,
     Run,
     allocate,
+    to_earth,
 )
 from gripbench.envs.plants.simulation import Action, Simulation
 from gripbench.envs.roads.road import SPACING as ROAD_SPACING
@@ -311,6 +312,10 @@ class BicycleSimulation(Simulation):
     def fresh(self) -> BicycleSimulation:
         """Return another simulation of the same scenario and vehicle, not started."""
         return BicycleSimulation(self._scenario, self._vehicle)
+
+    def path(self) -> npt.NDArray[np.float64]:
+        """Return the path, north and west [m], shape (n, 2)."""
+        return to_earth(self._run.path[:, :2], float(self._run.site[HEADING]))
 
     def _start(self, seed: int) -> None:
         scenario = self._scenario

@@ -71,6 +71,13 @@ class Simulation(ABC):
         """Return facts of the run that a score may need, by name."""
         return {}
 
+    def path(self) -> npt.NDArray[np.float64]:
+        """Return the path that the driver follows, north and west [m], shape (n, 2).
+
+        No rows where there is none; known once the run has been started.
+        """
+        return np.zeros((0, 2))
+
     @classmethod
     def together(cls, simulations: Sequence[Any]) -> Lanes:
         """Return runs of one scenario that advance together."""
@@ -89,22 +96,50 @@ class Lanes:
     """
 
     def __init__(self, simulations: Sequence[Simulation]) -> None:
-        self._simulations = simulations
+        self._simulations = list(simulations)
 
     @property
     def terminations(self) -> list[str]:
         """Why each lane has ended; empty while it goes on."""
         return [simulation.termination for simulation in self._simulations]
 
+    def path(self, lane: int) -> npt.NDArray[np.float64]:
+        """Return the path of a lane, see `Simulation.path`."""
+        return self._simulations[lane].path()
+
+    def replace(self, lane: int, simulation: Simulation) -> None:
+        """Put another simulation into a lane; it has the same sample time and is reset next."""
+        self._simulations[lane] = simulation
+
     def reset(self, lane: int, seed: int) -> npt.NDArray[Any]:
         """Start a lane; return its first sample, shape (1,)."""
         return self._simulations[lane].reset(seed)
 
     def drive(self) -> npt.NDArray[np.float64]:
-        """Return what the scenario's driver commands in each lane, shape (lanes, inputs)."""
-        return np.stack([simulation.drive() for simulation in self._simulations])
+        """Return what the scenario's driver commands in each lane, shape (lanes, inputs).
 
-    def advance(self, actions: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
-        """Hold the actions, shape (lanes, inputs), for one sample time; return shape (lanes,)."""
-        pairs = zip(self._simulations, actions, strict=True)
-        return np.concatenate([simulation.advance(action) for simulation, action in pairs])
+        Zero in a lane that the simulation has ended.
+        """
+        nothing = np.zeros(len(self._simulations[0].actions))
+        return np.stack([nothing if one.termination else one.drive() for one in self._simulations])
+
+    def advance(
+        self, actions: npt.NDArray[np.float64], going: npt.NDArray[np.bool_]
+    ) -> npt.NDArray[Any]:
+        """Hold the actions for one sample time.
+
+        Parameters
+        ----------
+        actions
+            Shape (lanes, inputs).
+        going
+            Lanes that advance, shape (lanes,); the others' rows of the result are zero.
+
+        Returns
+        -------
+        Structured array, shape (lanes,): the sample at the end.
+        """
+        truth = np.zeros(len(self._simulations), self._simulations[0].truth_type)
+        for lane in np.flatnonzero(going):
+            truth[lane] = self._simulations[lane].advance(actions[lane])[0]
+        return truth

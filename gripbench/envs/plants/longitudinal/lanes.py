@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gripbench.envs.drivers.profiles import profile_value
-from gripbench.envs.plants.longitudinal.plant import TYRE_TYPE, compiled
+from gripbench.envs.plants.longitudinal.plant import INPUT_TYPE, TYRE_TYPE, compiled
 from gripbench.envs.plants.longitudinal.world import (
     NOISE_BLOCK,
     TRUTH_TYPE,
@@ -17,27 +17,39 @@ from gripbench.envs.plants.longitudinal.world import (
     advance_one,
     command,
 )
-from gripbench.envs.plants.simulation import Lanes
+from gripbench.envs.plants.simulation import Lanes, Simulation
 
 
 class LongitudinalLanes(Lanes):
-    """Several runs of a longitudinal scenario, advanced in one compiled call."""
+    """Several runs of a longitudinal scenario, advanced in one compiled call.
+
+    Each lane has its own vehicle and profiles; sample time and integrator are those of all.
+    """
 
     def __init__(self, simulations: Sequence[LongitudinalSimulation]) -> None:
         super().__init__(simulations)
-        self._runs = simulations
+        self._runs = list(simulations)
         count = len(simulations)
         self._x = np.zeros((count, 3))
         self._steps = np.zeros(count)
         self._k = np.zeros(count, np.int64)
         self._jumps = np.zeros((count, NOISE_BLOCK, 2))
         self._tyres = np.zeros(count, TYRE_TYPE)
+        self._inputs = np.zeros(1, INPUT_TYPE)
         self._ended = [""] * count
+        self._stack()
 
     @property
     def terminations(self) -> list[str]:
         """Why each lane has ended; empty while it goes on."""
-        return self._ended
+        return list(self._ended)
+
+    def replace(self, lane: int, simulation: Simulation) -> None:
+        """Put another simulation into a lane; it has the same sample time and is reset next."""
+        assert isinstance(simulation, LongitudinalSimulation)
+        super().replace(lane, simulation)
+        self._runs[lane] = simulation
+        self._stack()
 
     def reset(self, lane: int, seed: int) -> npt.NDArray[Any]:
         """Start a lane; return its first sample."""
@@ -50,67 +62,90 @@ class LongitudinalLanes(Lanes):
 
     def drive(self) -> npt.NDArray[np.float64]:
         """Return the torques of the scenario's profiles in each lane."""
-        front, rear, _ = self._runs[0]._profiles
+        front, rear, _ = self._profiles
         torques = np.empty((len(self._runs), 2))
         _drive_lanes(self._k, self._runs[0].scenario.sample_time, front, rear, torques)
         return torques
 
-    def advance(self, actions: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
-        """Hold the axle torques of each lane for one sample time."""
+    def advance(
+        self, actions: npt.NDArray[np.float64], going: npt.NDArray[np.bool_]
+    ) -> npt.NDArray[Any]:
+        """Hold the axle torques of each lane that is going for one sample time."""
         first = self._runs[0]
-        for lane in map(int, np.flatnonzero(self._k % NOISE_BLOCK == 0)):
+        lanes = np.flatnonzero(going)
+        for lane in map(int, lanes[self._k[lanes] % NOISE_BLOCK == 0]):
             self._jumps[lane] = self._runs[lane]._draw(NOISE_BLOCK)
         truth = np.zeros(len(self._runs), TRUTH_TYPE)
         _advance_lanes(
+            lanes,
             self._k,
             first.scenario.sample_time,
             self._x,
             self._steps,
             actions,
-            first._inputs,
-            first._plant,
+            self._inputs,
+            self._plants,
             first._integrator,
-            first._profiles,
-            first.scenario.road_grade,
+            self._profiles,
+            self._grades,
             self._jumps,
             self._tyres,
             first._work,
             truth,
         )
-        self._k += 1
-        for lane in map(int, np.flatnonzero(~np.isfinite(self._x).all(axis=1))):
+        self._k[lanes] += 1
+        for lane in map(int, lanes[~np.isfinite(self._x[lanes]).all(axis=1)]):
             self._ended[lane] = "diverged"
         return truth
+
+    def _stack(self) -> None:
+        """Lay the vehicles, grades and profiles of the lanes side by side.
+
+        Profiles of fewer pieces are filled with pieces of no length, which add nothing.
+        """
+        self._plants = np.concatenate([run._plant for run in self._runs])
+        self._grades = np.array([run.scenario.road_grade for run in self._runs])
+        stacked = []
+        for part in range(3):
+            pieces = [run._profiles[part] for run in self._runs]
+            table = np.zeros((len(pieces), max(map(len, pieces))), pieces[0].dtype)
+            for lane, given in enumerate(pieces):
+                table[lane, : len(given)] = given
+            stacked.append(table)
+        self._profiles = tuple(stacked)
 
 
 @compiled
 def _drive_lanes(k, sample_time, front, rear, torques):  # type: ignore[no-untyped-def]
     for lane in range(k.shape[0]):
         middle = (k[lane] + 0.5) * sample_time
-        torques[lane, 0] = profile_value(middle, front)
-        torques[lane, 1] = profile_value(middle, rear)
+        torques[lane, 0] = profile_value(middle, front[lane])
+        torques[lane, 1] = profile_value(middle, rear[lane])
 
 
 @compiled
 def _advance_lanes(  # type: ignore[no-untyped-def]
+    lanes,
     k,
     sample_time,
     x,
     steps,
     actions,
     inputs,
-    plant,
+    plants,
     integrator,
     profiles,
-    grade,
+    grades,
     jumps,
     tyres,
     work,
     truth,
 ):
     front, rear, friction = profiles
-    for lane in range(x.shape[0]):
-        command(k[lane], sample_time, front, rear, friction, grade, inputs[0])
+    for lane in lanes:
+        command(
+            k[lane], sample_time, front[lane], rear[lane], friction[lane], grades[lane], inputs[0]
+        )
         inputs[0].torque_front = actions[lane, 0]
         inputs[0].torque_rear = actions[lane, 1]
         steps[lane] = advance_one(
@@ -119,7 +154,7 @@ def _advance_lanes(  # type: ignore[no-untyped-def]
             x[lane],
             steps[lane],
             inputs[0],
-            plant[0],
+            plants[lane],
             integrator,
             jumps[lane, k[lane] % jumps.shape[1]],
             tyres[lane],

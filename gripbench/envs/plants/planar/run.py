@@ -79,6 +79,12 @@ def allocate() -> dict[str, npt.NDArray[np.float64]]:
     }
 
 
+def to_earth(points: npt.NDArray[np.float64], heading: float) -> npt.NDArray[np.float64]:
+    """Return points of the track, shape (n, 2), as north and west; the track heads there [rad]."""
+    sin, cos = math.sin(heading), math.cos(heading)
+    return np.asarray(points @ np.array([[cos, sin], [-sin, cos]]))
+
+
 @numba.njit(cache=True, error_model="numpy", nogil=True)
 def begin(run, speed, truth, columns):  # type: ignore[no-untyped-def]
     """Put the vehicle at the origin of the track, rolling at a speed; write the first sample.

@@ -12,6 +12,7 @@ from pydantic import Field
 from gripbench.envs.plants.driven import DrivenScenario
 from gripbench.envs.plants.planar import plant
 from gripbench.envs.plants.planar.run import (
+    HEADING,
     TERMINATIONS,
     Run,
     act,
@@ -19,6 +20,7 @@ from gripbench.envs.plants.planar.run import (
     begin,
     decide,
     roll_out,
+    to_earth,
 )
 from gripbench.envs.plants.planar.truth import TRUTH
 from gripbench.envs.plants.simulation import Action, Simulation
@@ -132,6 +134,10 @@ class PlanarSimulation(Simulation):
     def fresh(self) -> PlanarSimulation:
         """Return another simulation of the same scenario and vehicle, not started."""
         return PlanarSimulation(self._scenario, self._vehicle)
+
+    def path(self) -> npt.NDArray[np.float64]:
+        """Return the path, north and west [m], shape (n, 2)."""
+        return to_earth(self._run.path[:, :2], float(self._run.site[HEADING]))
 
     def _start(self, seed: int) -> None:
         """Draw whatever is random in the run, and clear what changes."""
