@@ -1,20 +1,39 @@
 """Rows of methods that exist on paper only."""
 
+import math
+
 import numpy as np
 
-from gripbench.bench.running.rows import Row, Runtime, Stratum, TargetScore, frame_of
+from gripbench.bench.running.rows import Row, Runtime, frame_of
+from gripbench.bench.scoring.metric import Value
 
 TORQUE = ("torque_front", "wheel_speed_front", "accel_x")
 GPS = (*TORQUE, "speed_gps")
 IDEAL = (*TORQUE, "wheel_acceleration_front")
 
 
+def mean_square(total, count):
+    return Value(value=math.sqrt(total / count), total=total, count=count)
+
+
 def score(rms, count=100, **more):
     squares = rms * rms * count
-    parts = {"low": Stratum(sum_of_squares=squares / 4, count=count // 2),
-             "limit": Stratum(sum_of_squares=3 * squares / 4, count=count // 2)}  # fmt: skip
-    values = {"peak": 3 * rms, "bias": rms / 2, "by_utilisation": parts, **more}
-    return TargetScore(rms=rms, sum_of_squares=squares, count=count, **values)
+    return {
+        "rms": Value(value=rms, total=squares, count=count),
+        "peak": Value(value=3 * rms),
+        "bias": Value(value=rms / 2, total=rms / 2 * count, count=count),
+        "convergence_time": Value(value=None),
+        "rms_low": mean_square(squares / 4, count // 2),
+        "rms_limit": mean_square(3 * squares / 4, count // 2),
+        **more,
+    }
+
+
+def response(total, count, delay=None, **more):
+    """What the metrics of excitation say of a run; `jump_delay` where the friction jumps."""
+    jump = {"jump_delay": Value(value=more["jump_delay"])} if "jump_delay" in more else {}
+    excited = {"excited_rms": mean_square(total, count), "friction_delay": Value(value=delay)}
+    return {**excited, **jump}
 
 
 def row(label, seed, rms, scenario="step", target="mu_front", **more):

@@ -7,14 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gripbench.bench.ranking.summary import summary
-from gripbench.bench.running.rows import FrictionResponse, frame_of
-from gripbench.bench.scoring.friction_response import (
-    BAND,
-    EXCITED,
-    HOLD,
-    friction_response,
-    is_available_friction,
-)
+from gripbench.bench.running.rows import frame_of
+from gripbench.bench.scoring.metric import Context
+from gripbench.bench.scoring.metrics import metrics
+from gripbench.bench.scoring.metrics.excitation import BAND, EXCITED, HOLD, is_available_friction
 from gripbench.bench.scoring.scoring import score
 from gripbench.envs.recordings import Recording
 from gripbench.envs.signals import record_type
@@ -27,53 +23,64 @@ NO_JUMP = np.nan
 
 
 def respond(estimate, truth=None, accel_y=CORNERING, score_from=0.0, jump=NO_JUMP):
+    """Values of the metrics of excitation by name, without those that say nothing."""
     truth = np.full(len(TIMES), MU) if truth is None else truth
-    return friction_response(TIMES, estimate, truth, accel_y, score_from, jump)
+    kept = score_from <= TIMES
+    channels = {"accel_y": accel_y[kept]}
+    context = Context("mu", score_from, {"mu_jump_time": jump}, None, channels.get)
+    found = {
+        name: metrics()[name].of_run(TIMES[kept], estimate[kept], truth[kept], context)
+        for name in ("excited_rms", "friction_delay", "jump_delay")
+    }
+    return {name: value for name, value in found.items() if value is not None}
 
 
 def test_delay_counts_from_the_first_excitation():
     found = respond(np.where(TIMES < 7.5, 0.5, MU))
-    assert found.delay == pytest.approx(2.5)
-    assert (found.jumped, found.jump_delay) == (False, None)
+    assert found["friction_delay"].value == pytest.approx(2.5)
+    assert "jump_delay" not in found
 
 
 @pytest.mark.parametrize(("factor", "settles"), [(1.01, False), (0.99, True)])
 def test_settled_is_within_the_band(factor, settles):
-    assert (respond(np.full(len(TIMES), MU * (1.0 + factor * BAND))).delay == 0.0) is settles
+    found = respond(np.full(len(TIMES), MU * (1.0 + factor * BAND)))
+    assert (found["friction_delay"].value == 0.0) is settles
 
 
 @pytest.mark.parametrize(("stay", "delay"), [(HOLD - 0.02, 5.0), (HOLD + 0.02, 1.0)])
 def test_settled_is_for_a_second(stay, delay):
     end = 6.0 + stay
     early = (TIMES >= 6.0) & (end >= TIMES)
-    assert respond(np.where(early | (TIMES >= 10.0), MU, 0.5)).delay == pytest.approx(delay)
+    found = respond(np.where(early | (TIMES >= 10.0), MU, 0.5))
+    assert found["friction_delay"].value == pytest.approx(delay)
 
 
 def test_a_guess_that_is_right_by_chance_before_the_excitation_earns_nothing():
     found = respond(np.where(TIMES < 5.0, MU, 0.6))
-    assert found.delay is None
-    assert found.count == np.sum(TIMES >= 5.0)
-    assert found.sum_of_squares == pytest.approx(found.count * 0.3**2)
+    assert found["friction_delay"].value is None
+    assert found["excited_rms"].count == np.sum(TIMES >= 5.0)
+    assert found["excited_rms"].value == pytest.approx(0.3)
 
 
 def test_left_turns_excite_like_right_turns_and_nothing_counts_before_the_scores():
     early = np.where(TIMES < 1.0, 9.0, -CORNERING)
-    assert respond(np.where(TIMES < 7.5, 0.5, MU), None, early, 3.0).delay == pytest.approx(2.5)
+    found = respond(np.where(TIMES < 7.5, 0.5, MU), None, early, 3.0)
+    assert found["friction_delay"].value == pytest.approx(2.5)
 
 
 def test_without_excitation_there_is_no_response():
-    assert respond(np.full(len(TIMES), MU), None, 0.9 / 1.1 * CORNERING) is None
+    assert respond(np.full(len(TIMES), MU), None, 0.9 / 1.1 * CORNERING) == {}
 
 
 def test_a_jump_has_a_delay_of_its_own_and_ends_the_first():
     truth = np.where(TIMES < 10.0, MU, 0.2)
     found = respond(np.where(TIMES < 11.5, MU, 0.2), truth, jump=10.0)
-    assert (found.delay, found.jumped) == (0.0, True)
-    assert found.jump_delay == pytest.approx(1.5)
+    assert found["friction_delay"].value == 0.0
+    assert found["jump_delay"].value == pytest.approx(1.5)
     late = respond(np.full(len(TIMES), 0.2), truth, jump=10.0)
-    assert late.delay is None
-    assert late.jump_delay == 0.0
-    assert respond(np.full(len(TIMES), MU), truth, jump=10.0).jump_delay is None
+    assert late["friction_delay"].value is None
+    assert late["jump_delay"].value == 0.0
+    assert respond(np.full(len(TIMES), MU), truth, jump=10.0)["jump_delay"].value is None
 
 
 @given(st.integers(0, 10**6), st.floats(0.02, 0.5))
@@ -86,7 +93,7 @@ def test_agrees_with_its_definition(seed, length):
     starts = range(500, len(TIMES) - round(HOLD / 0.01))
     stays = (k for k in starts if within[k : k + round(HOLD / 0.01) + 1].all())
     expected = next(stays, None)
-    found = respond(estimate).delay
+    found = respond(estimate)["friction_delay"].value
     if expected is None:
         assert found is None
     else:
@@ -106,22 +113,22 @@ def test_only_the_available_friction_responds():
     estimates["mu"], estimates["mu_used"] = MU, 0.1
     recording = Recording("s", 0, {}, truth, truth, notes={"mu_jump_time": 8.0})
     found = score(estimates, names, names, recording)
-    assert found["mu"].friction.delay == 0.0
-    assert found["mu"].friction.jumped
-    assert found["mu_used"].friction is None
+    assert found["mu"]["friction_delay"].value == 0.0
+    assert "jump_delay" in found["mu"]
+    assert not {"friction_delay", "jump_delay", "excited_rms"} & set(found["mu_used"])
 
 
 def test_a_summary_counts_who_settles_and_averages_their_delays():
     responses = [
-        FrictionResponse(sum_of_squares=4.0, count=100, delay=1.0, jumped=True, jump_delay=2.0),
-        FrictionResponse(sum_of_squares=0.0, count=300, delay=2.0, jumped=True),
-        FrictionResponse(sum_of_squares=1.0, count=100, delay=None),
+        synthetic_rows.response(4.0, 100, 1.0, jump_delay=2.0),
+        synthetic_rows.response(0.0, 300, 2.0, jump_delay=None),
+        synthetic_rows.response(1.0, 100),
     ]
     rows = [
         synthetic_rows.row(
-            "a", seed, None, target="mu", score=synthetic_rows.score(1.0, friction=response)
+            "a", seed, None, target="mu", score=synthetic_rows.score(1.0, **response)
         )
-        for seed, response in enumerate([*responses, None])
+        for seed, response in enumerate([*responses, {}])
     ]
     line = summary(frame_of(rows)).iloc[0]
     assert line["excited_rms"] == pytest.approx(0.1)

@@ -9,7 +9,7 @@ from rich.console import Console
 
 from gripbench.bench.publishing import presentation
 from gripbench.bench.ranking.summary import summary
-from gripbench.bench.running.rows import FrictionResponse, frame_of
+from gripbench.bench.running.rows import frame_of
 
 SCENARIOS = tuple(f"a_scenario_with_a_long_name_{k}" for k in range(9))
 
@@ -56,17 +56,17 @@ def test_few_scenarios_stay_side_by_side():
 
 
 def test_the_response_of_the_friction_has_its_columns():
-    response = FrictionResponse(sum_of_squares=4.0, count=100, delay=1.5)
-    late = FrictionResponse(sum_of_squares=4.0, count=100)
+    response = synthetic_rows.response(4.0, 100, 1.5)
+    late = synthetic_rows.response(4.0, 100)
     never = synthetic_rows.row("quiet", 0, 0.1, "one", "mu")
-    jump = FrictionResponse(sum_of_squares=1.0, count=100, jumped=True, jump_delay=0.25)
+    jump = synthetic_rows.response(1.0, 100, jump_delay=0.25)
     rows = [
         synthetic_rows.row("a", seed, None, "one", "mu",
-                           score=synthetic_rows.score(0.5, friction=friction))
+                           score=synthetic_rows.score(0.5, **friction))
         for seed, friction in enumerate((response, late))
     ]  # fmt: skip
     rows += [never, synthetic_rows.row("a", 0, None, "two", "mu",
-                                       score=synthetic_rows.score(0.5, friction=jump))]  # fmt: skip
+                                       score=synthetic_rows.score(0.5, **jump))]  # fmt: skip
     text = text_of(rows)
     line = next(line for line in text.splitlines() if line.startswith("  a"))
     assert line.split() == ["a", "0.500", "[0.500,", "0.500]", "0.200", "[0.200,", "0.200]",

@@ -5,15 +5,16 @@ import pytest
 from synthetic_rows import GPS, IDEAL, TORQUE, noisy_frame, noisy_rows, row, score
 
 from gripbench.bench.ranking.grids import instruments
-from gripbench.bench.ranking.ranking import COLUMNS, boards, rank
+from gripbench.bench.ranking.ranking import boards, columns, rank
 from gripbench.bench.running.rows import Runtime, frame_of
+from gripbench.bench.scoring.metric import Value
 from gripbench.errors import InputError
 
 
 def test_known_order_with_known_scores():
     frame = noisy_frame({"worst": 4.0, "best": 1.0, "middle": 2.0}, spread=0.0)
     found = rank(frame)
-    assert tuple(found.columns) == COLUMNS
+    assert tuple(found.columns) == columns()
     assert list(found["label"]) == ["best", "middle", "worst"]
     assert list(found["rank"]) == [1, 2, 3]
     np.testing.assert_allclose(found["score"], [0.5, 1.0, 2.0], rtol=1e-12)
@@ -43,7 +44,7 @@ def test_pooled_columns_are_by_the_mean_of_squares():
 
 
 def test_never_converged_counts_as_infinite_in_the_median():
-    rows = [row("a", seed, None, score=score(1.0, convergence_time=time))
+    rows = [row("a", seed, None, score=score(1.0, convergence_time=Value(value=time)))
             for seed, time in enumerate([1.0, 2.0, None])]  # fmt: skip
     rows += [row("b", seed, None, score=score(2.0)) for seed in range(3)]
     found = rank(frame_of(rows)).set_index("label")

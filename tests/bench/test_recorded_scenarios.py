@@ -22,9 +22,9 @@ from gripbench.bench.running.recorded_scenarios import (
     recording_of,
     windows_of,
 )
-from gripbench.bench.running.rows import pooled_rms
 from gripbench.bench.running.runner import run_plan
 from gripbench.bench.running.store import Store
+from gripbench.bench.scoring.metric import pooled_rms
 from gripbench.envs.recordings import Bounds, Recording
 from gripbench.envs.signals import record_type
 from gripbench.errors import InputError

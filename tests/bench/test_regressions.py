@@ -29,7 +29,7 @@ def scaled(rows, label, factor, noise=0.0, scenario=None, seed=5):
     for item in rows:
         draw = factor * math.exp(noise * rng.standard_normal())
         if item.label == label and scenario in (None, item.scenario):
-            rms = item.scores["mu_front"].rms * draw
+            rms = item.scores["mu_front"]["rms"].value * draw
             item = row(item.label, item.seed, rms, item.scenario)
         changed.append(item)
     return changed

@@ -4,8 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy import stats
 
-from gripbench.bench.scoring.scoring import BAND, HOLD, DivergedError, EstimateError, score
+from gripbench.bench.scoring.metrics.convergence import BAND, HOLD
+from gripbench.bench.scoring.metrics.excitation import EXCITED
+from gripbench.bench.scoring.metrics.utilisation import UTILISATION_BANDS
+from gripbench.bench.scoring.scoring import DivergedError, EstimateError, score
 from gripbench.envs.recordings import Recording
 from gripbench.envs.signals import record_type
 
@@ -38,18 +42,19 @@ def test_scores_are_those_of_numpy(seed, length, score_from):
     found = score(values, names, ("mu_front",), recording)["mu_front"]
     kept = recording.truth["time"] >= recording.score_from
     error = (values["mu_front"] - truth)[kept]
-    assert found.count == kept.sum()
-    assert found.rms == pytest.approx(np.sqrt(np.mean(error**2)), rel=1e-12)
-    assert found.peak == np.abs(error).max()
-    assert found.bias == pytest.approx(error.mean(), abs=1e-12)
-    assert found.mean_nees == pytest.approx(np.mean(error**2) / 0.25, rel=1e-12)
+    assert found["rms"].count == kept.sum()
+    assert found["rms"].value == pytest.approx(np.sqrt(np.mean(error**2)), rel=1e-12)
+    assert found["peak"].value == np.abs(error).max()
+    assert found["bias"].value == pytest.approx(error.mean(), abs=1e-12)
+    assert found["mean_nees"].value == pytest.approx(np.mean(error**2) / 0.25, rel=1e-12)
     high = (used[kept] >= 0.5) & (used[kept] < 0.8)
     if high.any():
-        assert found.by_utilisation["high"].count == high.sum()
-        assert found.by_utilisation["high"].sum_of_squares == pytest.approx(
-            (error[high] ** 2).sum()
-        )
-    assert sum(band.count for band in found.by_utilisation.values()) == found.count
+        assert found["rms_high"].count == high.sum()
+        assert found["rms_high"].total == pytest.approx((error[high] ** 2).sum())
+    bands = [found[f"rms_{name}"].count for name, *_ in UTILISATION_BANDS if f"rms_{name}" in found]
+    assert sum(bands) == found["rms"].count
+    excited = found.get("rms_excited")
+    assert (excited.count if excited else 0) == np.sum(used[kept] > EXCITED)
 
 
 def test_convergence_is_the_start_of_the_first_long_stay_in_the_band():
@@ -57,7 +62,7 @@ def test_convergence_is_the_start_of_the_first_long_stay_in_the_band():
     error = np.where(times < 2.0, 1.0, 0.5 * BAND)
     error[100 : 100 + int(HOLD / 0.01) - 5] = 0.0  # a stay that is too short
     found = score(*estimates_of(1.0 + error), ("mu_front",), a_recording(np.ones(500)))
-    assert found["mu_front"].convergence_time == pytest.approx(2.0)
+    assert found["mu_front"]["convergence_time"].value == pytest.approx(2.0)
 
 
 def test_convergence_counts_from_the_friction_step():
@@ -65,20 +70,20 @@ def test_convergence_counts_from_the_friction_step():
     error = np.where((times >= 3.0) & (times < 4.25), 1.0, 0.0)
     recording = a_recording(np.ones(800), notes={"friction_step": 3.0})
     found = score(*estimates_of(1.0 + error), ("mu_front",), recording)
-    assert found["mu_front"].convergence_time == pytest.approx(1.25)
+    assert found["mu_front"]["convergence_time"].value == pytest.approx(1.25)
 
 
 def test_what_never_converges_has_no_convergence_time():
     found = score(*estimates_of(np.full(300, 2.0)), ("mu_front",), a_recording(np.ones(300)))
-    assert found["mu_front"].convergence_time is None
+    assert found["mu_front"]["convergence_time"].value is None
 
 
 def test_samples_without_truth_do_not_count():
     truth = np.ones(100)
     truth[40:] = np.nan
     found = score(*estimates_of(np.full(100, 1.5)), ("mu_front",), a_recording(truth))
-    assert found["mu_front"].count == 40
-    assert found["mu_front"].rms == pytest.approx(0.5)
+    assert found["mu_front"]["rms"].count == 40
+    assert found["mu_front"]["rms"].value == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
@@ -92,7 +97,7 @@ def test_an_estimate_that_is_not_finite_diverges_even_where_it_does_not_count(va
 def test_a_variance_that_is_not_positive_gives_no_consistency():
     values, names = estimates_of(np.ones(100), np.linspace(-1.0, 1.0, 100))
     found = score(values, names, ("mu_front",), a_recording(np.zeros(100)))
-    assert found["mu_front"].mean_nees is None
+    assert not {"mean_nees", "crps", "sharpness", "coverage_90"} & set(found["mu_front"])
 
 
 @pytest.mark.parametrize(
@@ -108,3 +113,59 @@ def test_a_variance_that_is_not_positive_gives_no_consistency():
 def test_estimates_of_another_form_are_refused(values, message):
     with pytest.raises(EstimateError, match=message):
         score(values, ("mu_front",), ("mu_front",), a_recording(np.ones(100)))
+
+
+def an_angle(truth, estimate):
+    records = np.zeros(len(truth), record_type(("time", "yaw")))
+    records["time"], records["yaw"] = 0.01 * np.arange(len(truth)), truth
+    made = np.zeros(len(truth), record_type(("yaw",)))
+    made["yaw"] = estimate
+    recording = Recording("s", 0, {}, records, records)
+    return score(made, ("yaw",), ("yaw",), recording)["yaw"]
+
+
+@given(st.integers(0, 10**6), st.integers(-3, 3))
+def test_the_error_of_an_angle_is_that_on_the_circle(seed, turns):
+    generator = np.random.default_rng(seed)
+    truth = generator.uniform(-np.pi, np.pi, 50)
+    estimate = truth + generator.normal(0.0, 2.0, 50) + 2.0 * np.pi * turns
+    difference = np.angle(np.exp(1j * (estimate - truth)))
+    found = an_angle(truth, estimate)
+    assert found["rms"].value == pytest.approx(np.sqrt(np.mean(difference**2)), abs=1e-9)
+    assert found["peak"].value == pytest.approx(np.abs(difference).max(), abs=1e-9)
+    assert found["bias"].value == pytest.approx(difference.mean(), abs=1e-9)
+
+
+def test_an_angle_turned_by_whole_turns_is_the_angle():
+    truth = np.linspace(-np.pi, np.pi, 100)
+    assert an_angle(truth, truth + 2.0 * np.pi)["peak"].value < 1e-14
+    assert an_angle(truth, truth - 4.0 * np.pi)["convergence_time"].value == 0.0
+
+
+def test_what_is_no_angle_is_not_wrapped():
+    found = score(*estimates_of(np.full(9, 1.0 + 2.0 * np.pi)), ("mu_front",),
+                  a_recording(np.ones(9)))  # fmt: skip
+    assert found["mu_front"]["rms"].value == pytest.approx(2.0 * np.pi)
+
+
+def test_an_estimate_that_cannot_be_squared_diverges():
+    with pytest.raises(DivergedError, match="mu_front is too large to be squared"):
+        score(*estimates_of(np.full(9, 1e155)), ("mu_front",), a_recording(np.ones(9)))
+
+
+@given(st.integers(0, 10**6), st.floats(0.1, 10.0))
+def test_calibration_against_quadrature_and_counting(seed, deviation):
+    """CRPS is the integral of (F(x) - 1[x >= truth])^2; coverage is counted."""
+    generator = np.random.default_rng(seed)
+    truth, values = generator.normal(size=(2, 20))
+    made, names = estimates_of(values, np.full(20, deviation**2))
+    found = score(made, names, ("mu_front",), a_recording(truth))["mu_front"]
+    grid = np.linspace(-100.0, 100.0, 100_001)
+    below = stats.norm(values[:, None], deviation).cdf(grid)
+    crps = np.trapezoid((below - (grid >= truth[:, None])) ** 2, grid, axis=1).mean()
+    assert found["crps"].value == pytest.approx(crps, abs=2e-3)
+    for level in (50, 90, 95):
+        low, high = stats.norm(values, deviation).interval(level / 100)
+        assert found[f"coverage_{level}"].value == np.mean((low <= truth) & (truth <= high))
+    low, high = stats.norm(values, deviation).interval(0.9)
+    assert found["sharpness"].value == pytest.approx((high - low).mean())

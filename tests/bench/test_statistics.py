@@ -8,7 +8,7 @@ from scipy import stats
 
 from gripbench.bench.ranking import statistics
 from gripbench.bench.ranking.pareto import pareto_front
-from gripbench.bench.running.rows import pooled_rms
+from gripbench.bench.scoring.metric import pooled_rms
 from gripbench.errors import InputError
 
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from gripbench import writing
 from gripbench.bench.running import rows, store
-from gripbench.bench.running.rows import Row, Stratum, TargetScore, pooled_rms, row_from
+from gripbench.bench.running.rows import Row, row_from
 from gripbench.bench.running.store import (
     DamagedRowError,
     Store,
@@ -20,20 +20,18 @@ from gripbench.bench.running.store import (
     read_rows,
     seal,
 )
+from gripbench.bench.scoring.metric import Value, pooled_rms
 from gripbench.errors import InputError
 
 SAMPLES = Path(__file__).parent / "stored_rows"
 
 
 def a_row(seed=0, **changes):
-    score = TargetScore(
-        rms=0.1,
-        sum_of_squares=1.0 / 3.0,
-        count=33,
-        peak=0.3,
-        bias=-0.01,
-        by_utilisation={"low": Stratum(sum_of_squares=1.0 / 3.0, count=33)},
-    )
+    score = {
+        "rms": Value(value=0.1, total=1.0 / 3.0, count=33),
+        "peak": Value(value=0.3),
+        "convergence_time": Value(value=None),
+    }
     content = {
         "key": "k",
         "scenario": "short",
@@ -75,22 +73,26 @@ def test_rows_of_the_first_schema_version_load():
     assert row is not None
     assert row.status == "ok"
     assert row.label == "slip_slope:paper"
-    assert row.scores["mu_front"].rms == 0.0406759484869095
+    assert row.scores["mu_front"]["rms"].value == 0.0406759484869095
     failed = read_row(SAMPLES / "version_1_failed.json")
     assert failed is not None
     assert (failed.status, failed.targets) == ("timeout", ("mu_front",))
     assert row.schema_version == failed.schema_version == rows.SCHEMA_VERSION
-    assert row.scores["mu_front"].friction is None
+    assert "excited_rms" not in row.scores["mu_front"]
 
 
 def test_rows_of_the_second_schema_version_load():
     row = read_row(SAMPLES / "version_2.json")
     assert row is not None
-    friction = row.scores["mu"].friction
-    assert friction is not None
-    assert friction.jumped
-    assert friction.delay is not None
-    assert friction.count < row.scores["mu"].count
+    values = row.scores["mu"]
+    old = json.loads((SAMPLES / "version_2.json").read_text())["row"]["scores"]["mu"]
+    assert values["rms"].total == old["sum_of_squares"]
+    assert values["rms"].value == old["rms"]
+    assert values["bias"].value == old["bias"]
+    assert values["rms_high"].total == old["by_utilisation"]["high"]["sum_of_squares"]
+    assert values["friction_delay"].value == old["friction"]["delay"]
+    assert values["jump_delay"].value == old["friction"]["jump_delay"]
+    assert values["excited_rms"].count < values["rms"].count
 
 
 def test_an_earlier_version_passes_through_every_step_to_the_present_one(monkeypatch):

@@ -11,7 +11,8 @@ from gripbench.bench.publishing.tables import Column, Table
 from gripbench.bench.publishing.timings import RelativeRuntime
 from gripbench.bench.ranking.ranking import Board
 from gripbench.bench.ranking.summary import FOOTNOTE, marked
-from gripbench.bench.running.rows import UTILISATION_BANDS
+from gripbench.bench.scoring.metric import SIGNAL_UNIT, Metric
+from gripbench.bench.scoring.metrics import metrics
 from gripbench.envs.signals import signal
 
 Timings = Mapping[str, Mapping[str, RelativeRuntime]]
@@ -28,9 +29,9 @@ def board_table(board: Board, timings: Timings | None = None, wide: bool = False
     timings
         Relative runtimes; without them the step times stored with the rows are shown.
     wide
-        With the scores beside RMS: peak, bias, convergence, RMS by utilisation, deadlines.
+        With every metric that has a value, quantiles of the step and deadlines.
     """
-    unit = signal(board.target).unit.replace("-", "")
+    unit = signal(board.target).display_unit.replace("-", "")
     percent = f"{100.0 * board.confidence:g} %"
     columns = [
         Column("rank", "Rank", format="d"),
@@ -45,20 +46,16 @@ def board_table(board: Board, timings: Timings | None = None, wide: bool = False
     ]
     if wide:
         columns += [
-            Column("peak", "Peak", unit, ".4g"),
-            Column("bias", "Bias", unit, "+.3g"),
-            Column("convergence", "Convergence", "s"),
-            Column("converged_share", "Converged", "% of runs", ".0f"),
-            *(
-                Column(f"rms_{band}", f"RMS {_band(low, high)}", unit, ".4g")
-                for band, low, high in UTILISATION_BANDS
-            ),
+            column
+            for metric in metrics().values()
+            if metric.name != "rms" and board.lines[metric.name].notna().any()
+            for column in _metric_columns(metric, board.target)
         ]
     columns += _runtime_columns(timings is not None, wide)
     columns += [Column("failures", "Failed", format="d")]
     if board.lines["failures"].any():
         columns += [Column("reason", "Reason")]
-    rows = [_row(line, timings or {}) for line in board.lines.to_dict("records")]
+    rows = [_row(line, board.target, timings or {}) for line in board.lines.to_dict("records")]
     notes = [
         f"{len(board.scenarios)} scenarios, {max(len(board.seeds), 1)} common seeds. Methods that "
         "share a letter are not separable; a marked score may be the best.",
@@ -103,17 +100,35 @@ def _runtime_columns(relative: bool, wide: bool) -> list[Column]:
     return columns
 
 
-def _row(line: Mapping[Any, Any], timings: Timings) -> dict[str, Any]:
+def _metric_columns(metric: Metric, target: str) -> list[Column]:
+    """Return the columns of a metric: its value, and the share of runs that reach it."""
+    unit = shown_in(metric, target)[1].replace("-", "")
+    if metric.pooling != "median":
+        return [Column(metric.name, metric.title, unit, metric.format)]
+    share = f"{metric.title}: reached in"
+    reached = [Column(metric.reached, share, "% of runs", ".0f")] if metric.reached else []
+    return [Column(metric.name, metric.title, unit), *reached]
+
+
+def shown_in(metric: Metric, target: str) -> tuple[float, str]:
+    """Return factor and unit in which people see a metric of a target."""
+    shown = signal(target)
+    own = metric.unit == SIGNAL_UNIT
+    return (shown.display_factor, shown.display_unit) if own else (1.0, metric.unit)
+
+
+def _row(line: Mapping[Any, Any], target: str, timings: Timings) -> dict[str, Any]:
     runtime = timings.get(line["label"], {}).get("batch")
+    factor = signal(target).display_factor
     return {
         **line,
+        **_metric_cells(line, target),
         "name": marked(line["label"], line["idealised"]),
         "ranks": _range(line["rank_from"], line["rank_to"], "d"),
         "scores": _range(line["score_from"], line["score_to"], ".3f"),
-        "rmses": _range(line["rms_from"], line["rms_to"], ".4g"),
+        "rms": _times(line["rms"], factor),
+        "rmses": _range(factor * line["rms_from"], factor * line["rms_to"], ".4g"),
         "tied": line["rank_from"] == 1 and line["failures"] == 0,
-        "converged_share": _times(line["converged"], 100.0),
-        "convergence": _convergence(line["convergence_time"]),
         "relative": runtime.relative if runtime else None,
         "step": _times(line["step_batch"], 1e9),
         "p50": _times(line["step_p50"], 1e6),
@@ -124,8 +139,20 @@ def _row(line: Mapping[Any, Any], timings: Timings) -> dict[str, Any]:
     }
 
 
-def _band(low: float, high: float) -> str:
-    return f"at {low:g}–{high:g} of mu" if high < 10.0 else f"above {low:g} of mu"
+def _metric_cells(line: Mapping[Any, Any], target: str) -> dict[str, Any]:
+    """Return the cells of every metric but the RMS, in the unit that people see."""
+    cells: dict[str, Any] = {}
+    for metric in metrics().values():
+        if metric.name == "rms":
+            continue
+        value = _times(line[metric.name], shown_in(metric, target)[0])
+        if metric.pooling == "median":
+            cells[metric.name] = _reached(value, metric.format)
+        else:
+            cells[metric.name] = value
+        if metric.reached:
+            cells[metric.reached] = _times(line[metric.reached], 100.0)
+    return cells
 
 
 def _range(low: float, high: float, format_spec: str) -> str | None:
@@ -134,10 +161,10 @@ def _range(low: float, high: float, format_spec: str) -> str | None:
     return f"{low:{format_spec}}–{high:{format_spec}}"
 
 
-def _convergence(time: float) -> str | None:
-    if pd.isna(time):
+def _reached(value: float | None, format_spec: str) -> str | None:
+    if value is None or pd.isna(value):
         return None
-    return "never" if time == float("inf") else f"{time:.2f}"
+    return "never" if value == float("inf") else f"{value:{format_spec}}"
 
 
 def _times(value: float | None, factor: float) -> float | None:

@@ -19,7 +19,7 @@ from pydantic import Field
 
 from gripbench.bench.publishing.leaderboard import Leaderboard, Runs
 from gripbench.bench.publishing.tables import Column, Table
-from gripbench.bench.running.rows import pooled_rms
+from gripbench.bench.scoring.metric import pooled_rms
 from gripbench.configuration import Configuration, parse
 from gripbench.errors import InputError
 from gripbench.writing import write_atomically

@@ -66,7 +66,7 @@ class Leaderboard(Configuration):
         Confidence of its ranks and intervals.
     boards
         Each board: target, sensors, title, scenarios, seeds, notes, and its `methods`, one
-        mapping a line with the columns of `gripbench.bench.ranking.ranking.COLUMNS`.
+        mapping a line with the columns of `gripbench.bench.ranking.ranking.columns`.
     runtimes
         Relative runtimes by label and form; empty without timings.
     runs

@@ -13,7 +13,7 @@ from gripbench.bench.publishing.leaderboard import Leaderboard, read
 from gripbench.bench.publishing.presentation import significant
 from gripbench.bench.publishing.tables import Column, Table, markdown
 from gripbench.bench.ranking.summary import FOOTNOTE, MARK
-from gripbench.bench.running.rows import pooled_rms
+from gripbench.bench.scoring.metric import pooled_rms
 from gripbench.envs.signals import signal
 from gripbench.methods.contract import CompiledMethod, Parameter
 

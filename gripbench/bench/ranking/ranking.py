@@ -30,18 +30,32 @@ from gripbench.bench.ranking.grids import (
     sensor_sets,
 )
 from gripbench.bench.ranking.pareto import pareto_front
-from gripbench.bench.running.rows import UTILISATION_BANDS, pooled_rms
+from gripbench.bench.scoring.metric import Metric, pooled_rms
+from gripbench.bench.scoring.metrics import metrics
 from gripbench.errors import InputError, unknown
 
-COLUMNS = (
+_BEFORE = (
     "target", "sensors", "rank", "rank_from", "rank_to", "group", "label", "method", "variant",
     "title", "reads", "idealised", "score", "score_from", "score_to", "rms", "rms_from", "rms_to",
-    "peak", "bias", "converged", "convergence_time", "mean_nees",
-    *(f"rms_{band}" for band, _, _ in UTILISATION_BANDS),
+)  # fmt: skip
+_BEHIND = (
     "step_batch", "step_p50", "step_p99", "step_max", "deadline_misses", "pareto",
     "failures", "reason", "cells", "seeds", "scenarios",
 )  # fmt: skip
-"""Columns of a ranking; docs/ranking.md describes each."""
+
+
+def columns() -> tuple[str, ...]:
+    """Return the columns of a ranking; docs/ranking.md describes each.
+
+    Each metric has one of its name, and one of the share of runs in which it is reached.
+    """
+    pooled = (
+        name
+        for metric in metrics().values()
+        for name in (metric.reached, metric.name)
+        if name and name != "rms"
+    )
+    return (*_BEFORE, *pooled, *_BEHIND)
 
 
 @dataclass(frozen=True)
@@ -63,7 +77,7 @@ class Board:
     seeds
         Seeds common to all methods.
     lines
-        One line a method from best to worst, with `COLUMNS`.
+        One line a method from best to worst, with `columns()`.
     p_better
         Adjusted p-value that the method of the row has a lower RMS than that of the column.
     wins
@@ -119,7 +133,7 @@ def rank(
 
     Returns
     -------
-    One line a board and method, best first, with `COLUMNS`.
+    One line a board and method, best first, with `columns()`.
 
     Raises
     ------
@@ -214,7 +228,7 @@ def _board(
     lines["seeds"] = len(grid.seeds) or 1
     lines["scenarios"] = len(grid.scenarios) + len(grid.single)
     lines["pareto"] = pareto_front(lines["score"], lines["step_batch"])
-    lines = lines[list(COLUMNS)].sort_values(["rank", "label"], ignore_index=True)
+    lines = lines[list(columns())].sort_values(["rank", "label"], ignore_index=True)
     order = list(lines["label"])
     runs = grid.rows.assign(rms=grid.rows["rms"].where(grid.rows["status"] == "ok"))
     matrix = runs.pivot_table(
@@ -321,8 +335,6 @@ def _summary(group: pd.DataFrame, complete: bool, settings: _Settings) -> dict[s
         settings.resamples,
         settings.seed,
     )
-    convergence = good["convergence_time"].astype(float).fillna(np.inf)
-    count = good["count"].astype(float)
     line: dict[str, Any] = {
         name: first[name] for name in ("label", "method", "variant", "title", "idealised")
     }
@@ -331,11 +343,6 @@ def _summary(group: pd.DataFrame, complete: bool, settings: _Settings) -> dict[s
         "rms": pooled_rms(good["sum_of_squares"], good["count"]) if complete else np.nan,
         "rms_from": low,
         "rms_to": high,
-        "peak": good["peak"].max() if complete else np.nan,
-        "bias": (good["bias"] * count).sum() / count.sum() if complete else np.nan,
-        "converged": float(np.isfinite(convergence).mean()) if complete else np.nan,
-        "convergence_time": float(convergence.median()) if complete else np.nan,
-        "mean_nees": good["mean_nees"].astype(float).mean() if complete else np.nan,
         "step_batch": good["step_batch"].astype(float).median(),
         "step_p50": good["step_p50"].astype(float).median(),
         "step_p99": good["step_p99"].astype(float).median(),
@@ -343,11 +350,22 @@ def _summary(group: pd.DataFrame, complete: bool, settings: _Settings) -> dict[s
         "deadline_misses": good["deadline_misses"].astype(float).mean(),
         "reason": "" if complete else _reason(bad),
     }
-    for band, _, _ in UTILISATION_BANDS:
-        squares = good[f"sum_of_squares_{band}"].astype(float).fillna(0.0)
-        samples = good[f"count_{band}"].astype(float).fillna(0.0)
-        line[f"rms_{band}"] = pooled_rms(squares, samples) if complete else np.nan
+    for metric in metrics().values():
+        if metric.name != "rms":
+            line |= _pooled(metric, good if complete else good.iloc[:0])
     return line
+
+
+def _pooled(metric: Metric, good: pd.DataFrame) -> dict[str, float]:
+    """Return a metric over the runs of a method, and in which share of them it is reached."""
+    if not set(metric.columns) <= set(good):  # rows of a frame that was read without the metric
+        good = good.iloc[:0].reindex(columns=list(metric.columns))
+    values = [good[name].to_numpy(float) for name in metric.columns]
+    found = {metric.name: metric.pooled(*values)}
+    if metric.reached:
+        known = values[0][~np.isnan(values[0])]
+        found[metric.reached] = float(np.isfinite(known).mean()) if len(known) else np.nan
+    return found
 
 
 def _reason(bad: pd.DataFrame) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from gripbench.bench.ranking.statistics import CONFIDENCE, draws, pooled_rms_interval
-from gripbench.bench.running.rows import pooled_rms
+from gripbench.bench.scoring.metric import pooled_rms
 
 MARK = "†"
 """Follows the name of a method that reads a channel which no sensor in a vehicle gives."""
@@ -73,8 +73,8 @@ def _friction(good: pd.DataFrame) -> dict[str, Any]:
     if "friction_delay" not in good:
         return {}
     excited = good[good["friction_delay"].notna()]
-    squares = excited["excited_sum_of_squares"].to_numpy(float)
-    counts = excited["excited_count"].to_numpy(float)
+    squares = excited["excited_rms_total"].to_numpy(float)
+    counts = excited["excited_rms_count"].to_numpy(float)
     low, high = pooled_rms_interval(squares, counts)
     found: dict[str, Any] = {
         "excited": len(excited),

@@ -13,12 +13,14 @@ import inspect
 import json
 import os
 import platform
+import sys
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import gripbench
 from gripbench.bench.running import recorded_scenarios
+from gripbench.bench.scoring.metrics import metrics
 from gripbench.envs import worlds
 from gripbench.envs.scenarios import Scenario
 from gripbench.envs.vehicles import load_vehicle
@@ -68,8 +70,11 @@ _RECORDING = ("instruments/sensors.py", "recordings.py", "vehicles.py", "plants/
 
 @cache
 def scoring_digest() -> str:
-    """Return the digest of the code that turns estimates into scores."""
-    return source_digest(_PROJECT / "bench" / "scoring" / "scoring.py")
+    """Return the digest of the code that turns estimates into scores, every metric included."""
+    scoring = _PROJECT / "bench" / "scoring" / "scoring.py"
+    functions = [metric.compute for metric in metrics().values()]
+    files = {sys.modules[getattr(each, "__module__", "")].__file__ for each in functions}
+    return source_digest(scoring, *sorted(Path(file) for file in files if file))
 
 
 def world_digest(scenario: Scenario) -> str:

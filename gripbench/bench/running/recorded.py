@@ -18,8 +18,8 @@ import numpy.typing as npt
 
 from gripbench.bench.catalogue.registry import MethodSpec, built_in_methods, choose_method
 from gripbench.bench.running.execution import SkippedError, execute, missing
-from gripbench.bench.running.rows import UTILISATION_BANDS
 from gripbench.bench.running.yardsticks import YARDSTICKS
+from gripbench.bench.scoring.metrics.utilisation import UTILISATION_BANDS
 from gripbench.bench.scoring.scoring import DivergedError, score, targets_of
 from gripbench.envs.recordings import Recording
 from gripbench.errors import GripbenchError
@@ -68,8 +68,7 @@ class RecordedScore:
     samples
         Samples that count.
     excitation
-        Band of utilisation, of `running.rows.UTILISATION_BANDS`, that these samples have;
-        empty: all.
+        Band of utilisation, of `UTILISATION_BANDS`, that these samples have; empty: all.
     """
 
     recording: str

@@ -8,18 +8,20 @@ the same bytes whenever the same cell is run; runtimes are not, and stay apart f
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field
 
+from gripbench.bench.scoring.metric import Value
+from gripbench.bench.scoring.metrics import metrics
 from gripbench.configuration import Configuration, parse
 from gripbench.errors import LONGEST, InputError, one_line
 
 if TYPE_CHECKING:
     import pandas as pd
 
-SCHEMA_VERSION = 3
+SCHEMA_VERSION = 4
 """Version of the stored form; rows of every earlier version still load (see `_MIGRATIONS`)."""
 
 Text = Annotated[str, BeforeValidator(lambda text: _storable(text))]
@@ -31,87 +33,6 @@ def _storable(text: Any) -> Any:
 
 
 Status = Literal["ok", "failed", "timeout", "diverged", "skipped"]
-
-UTILISATION_BANDS: tuple[tuple[str, float, float], ...] = (
-    ("low", 0.0, 0.2),
-    ("medium", 0.2, 0.5),
-    ("high", 0.5, 0.8),
-    ("limit", 0.8, math.inf),
-)
-"""Strata of the utilisation of the available friction: name, from (inclusive), to (exclusive)."""
-
-
-class Stratum(Configuration):
-    """Sum of squared errors over the samples of one band of utilisation."""
-
-    sum_of_squares: float = Field(ge=0.0)
-    count: int = Field(ge=0)
-
-    @property
-    def rms(self) -> float | None:
-        """Root mean square error, None without a sample."""
-        return math.sqrt(self.sum_of_squares / self.count) if self.count else None
-
-
-class FrictionResponse(Configuration):
-    """How an estimate of the available friction answers lateral excitation.
-
-    `gripbench.bench.scoring.friction_response` defines excitation and delay.
-
-    Attributes
-    ----------
-    sum_of_squares, count
-        Squared errors and samples from the first excitation on.
-    delay
-        Time [s] from the first excitation until the estimate has settled; None: it never does.
-    jumped
-        Whether the friction jumps in this run.
-    jump_delay
-        Time [s] from the jump until the estimate has settled again; None: it never does.
-    """
-
-    sum_of_squares: float = Field(ge=0.0)
-    count: int = Field(ge=0)
-    delay: float | None = None
-    jumped: bool = False
-    jump_delay: float | None = None
-
-
-class TargetScore(Configuration):
-    """Scores of one estimated signal over the scored samples of one run.
-
-    Attributes
-    ----------
-    rms
-        Root mean square error, in the signal's unit.
-    sum_of_squares, count
-        What `rms` is made of, so that runs can be pooled by the mean of squares.
-    peak
-        Largest absolute error.
-    bias
-        Mean of estimate minus truth.
-    convergence_time
-        Time [s] until the error stays within its band (see `gripbench.bench.scoring.scoring`); None
-        where it never does.
-    by_utilisation
-        The same sums for each band of utilisation in `UTILISATION_BANDS`; empty where the truth
-        knows no utilisation.
-    mean_nees
-        Mean of squared error over the method's own variance, 1 for a consistent filter; None
-        where the method gives no variance, or one that is not positive.
-    friction
-        For the available friction, its response to excitation; None where there is none.
-    """
-
-    rms: float = Field(ge=0.0)
-    sum_of_squares: float = Field(ge=0.0)
-    count: int = Field(ge=0)
-    peak: float
-    bias: float
-    convergence_time: float | None = None
-    by_utilisation: dict[str, Stratum] = Field(default_factory=dict)
-    mean_nees: float | None = None
-    friction: FrictionResponse | None = None
 
 
 class Runtime(Configuration):
@@ -153,6 +74,8 @@ class Row(Configuration):
         Channels that it reads, and those of them that no sensor in a vehicle gives.
     targets
         Signals that it should have been scored on, so that a failure counts in each.
+    scores
+        By target and name of the metric (see `gripbench.bench.scoring.metric`).
     status, reason
         `ok`, or what went wrong in one sentence.
     sample_period
@@ -184,7 +107,9 @@ class Row(Configuration):
     targets: tuple[str, ...] = ()
     status: Status
     reason: Text = ""
-    scores: dict[str, TargetScore] = Field(default_factory=dict)
+    scores: Annotated[
+        dict[str, dict[str, Value]], AfterValidator(lambda scores: _score_of_any_run(scores))
+    ] = Field(default_factory=dict)
     sample_period: float | None = None
     runtime: Runtime | None = None
     time_limit: float | None = None
@@ -196,9 +121,61 @@ class Row(Configuration):
     versions: dict[str, str] = Field(default_factory=dict)
 
 
+def _score_of_any_run(scores: dict[str, dict[str, Value]]) -> dict[str, dict[str, Value]]:
+    """Raise ValueError where what every comparison rests on is missing or impossible."""
+    for target, values in scores.items():
+        if "rms" not in values or not values["rms"].total >= 0.0 or not values["rms"].count:
+            raise ValueError(f"{target} has no RMS with a sum of squares and a count")
+    return scores
+
+
+def _to_metrics(content: dict[str, Any]) -> dict[str, Any]:
+    """Return a row of version 3, whose scores had fixed fields, with its values by metric."""
+    scores = content.get("scores", {})
+    if not isinstance(scores, dict) or not all(isinstance(old, dict) for old in scores.values()):
+        return {**content, "schema_version": 4}  # what it is not, the reader of rows says
+    return {
+        **content,
+        "schema_version": 4,
+        "scores": {target: _values_of(old) for target, old in scores.items()},
+    }
+
+
+def _values_of(old: dict[str, Any]) -> dict[str, Any]:
+    """Return the values by metric of the scores that rows had up to version 3."""
+    try:
+        count = old["count"]
+        found: dict[str, Any] = {
+            "rms": {"value": old["rms"], "total": old["sum_of_squares"], "count": count},
+            "peak": {"value": old["peak"]},
+            "bias": {"value": old["bias"], "total": old["bias"] * count, "count": count},
+            "convergence_time": {"value": old.get("convergence_time")},
+        }
+        for band, part in old.get("by_utilisation", {}).items():
+            found[f"rms_{band}"] = _mean_square(part)
+        if old.get("mean_nees") is not None:
+            nees = old["mean_nees"]
+            found["mean_nees"] = {"value": nees, "total": nees * count, "count": count}
+        friction = old.get("friction")
+        if friction is not None:
+            found["excited_rms"] = _mean_square(friction)
+            found["friction_delay"] = {"value": friction.get("delay")}
+            if friction.get("jumped"):
+                found["jump_delay"] = {"value": friction.get("jump_delay")}
+    except (ArithmeticError, AttributeError, KeyError, TypeError, ValueError):
+        return {"rms": old}  # no score of version 3: the reader of rows names it
+    return found
+
+
+def _mean_square(part: dict[str, Any]) -> dict[str, Any]:
+    total, count = part["sum_of_squares"], part["count"]
+    return {"value": math.sqrt(total / count), "total": total, "count": count}
+
+
 _MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {
     1: lambda content: {**content, "schema_version": 2},  # 2 added the response of the friction
     2: lambda content: {**content, "schema_version": 3},  # 3 added what a row rests on
+    3: _to_metrics,
 }
 """For each earlier version, the function that turns its content into the next version's."""
 
@@ -236,22 +213,31 @@ def frame_of(rows: Iterable[Row]) -> pd.DataFrame:
 
     A row that is not `ok` has a line with NaN scores for each of its targets, so that no failure
     vanishes from a table made of the frame. Columns: `scenario, seed, label, method, variant,
-    title, target, status, reason, rms, sum_of_squares, count, peak, bias, convergence_time,
-    mean_nees, excited_sum_of_squares, excited_count, friction_delay, jump_delay, rms_<band>,
-    sum_of_squares_<band>, count_<band>` for each utilisation band, `sample_period, step_batch,
-    step_p50, step_p99, step_max, deadline_misses, sensors, idealised, parameters, key`. Delays of
-    the friction are inf where it never settles, and NaN where nothing excites it or it does not
-    jump.
+    title, target, status, reason`, the columns of each metric, `sample_period, step_batch,
+    step_p50, step_p99, step_max, deadline_misses, sensors, idealised, parameters, key`.
+
+    A metric has a column of its name; one that is pooled by totals also `<name>_total` and
+    `<name>_count`, which for the RMS are called `sum_of_squares` and `count`. NaN: the metric has
+    nothing to say; inf: not reached within the run (a time until an error stays small). A metric
+    that is found in rows only, because its package is not installed here, has the column of its
+    name.
     """
     import pandas as pd  # half a second that a worker process need not spend
 
+    rows = list(rows)
+    known = metrics()
+    used = (name for row in rows for scores in row.scores.values() for name in scores)
+    foreign = tuple(dict.fromkeys(name for name in used if name not in known))
+    names = (*(name for metric in known.values() for name in metric.columns), *foreign)
     lines: list[dict[str, Any]] = []
     for row in rows:
         common = _common_columns(row)
         for target in row.targets or tuple(row.scores) or ("",):
-            lines.append({**common, "target": target, **_score_columns(row.scores.get(target))})
-    columns = [*_COMMON[:6], "target", *_COMMON[6:8], *_SCORE_COLUMNS, *_COMMON[8:]]
-    return pd.DataFrame(lines, columns=columns)
+            scores = _score_columns(row.scores.get(target, {}))
+            lines.append({**common, "target": target, "count": 0, **scores})
+    columns = [*_COMMON[:6], "target", *_COMMON[6:8], *names, *_COMMON[8:]]
+    numbers = {name: int if name == "count" else float for name in names}
+    return pd.DataFrame(lines, columns=columns).astype(numbers)
 
 
 _COMMON = (
@@ -285,44 +271,14 @@ def _common_columns(row: Row) -> dict[str, Any]:
     }
 
 
-_PLAIN_SCORES = (
-    "rms", "sum_of_squares", "count", "peak", "bias", "convergence_time", "mean_nees",
-)  # fmt: skip
-_FRICTION_SCORES = ("excited_sum_of_squares", "excited_count", "friction_delay", "jump_delay")
-_SCORE_COLUMNS = (
-    *_PLAIN_SCORES,
-    *_FRICTION_SCORES,
-    *(f"{kind}_{band}" for band, _, _ in UTILISATION_BANDS
-      for kind in ("rms", "sum_of_squares", "count")),
-)  # fmt: skip
-
-
-def _score_columns(score: TargetScore | None) -> dict[str, float | None]:
-    if score is None:
-        return {**dict.fromkeys(_SCORE_COLUMNS, math.nan), "count": 0}
-    columns: dict[str, float | None] = {name: getattr(score, name) for name in _PLAIN_SCORES}
-    if score.friction is not None:
-        friction = score.friction
-        columns["excited_sum_of_squares"] = friction.sum_of_squares
-        columns["excited_count"] = friction.count
-        columns["friction_delay"] = math.inf if friction.delay is None else friction.delay
-        if friction.jumped:
-            late = friction.jump_delay
-            columns["jump_delay"] = math.inf if late is None else late
-    for band, stratum in score.by_utilisation.items():
-        columns[f"rms_{band}"] = stratum.rms
-        columns[f"sum_of_squares_{band}"] = stratum.sum_of_squares
-        columns[f"count_{band}"] = stratum.count
+def _score_columns(scores: Mapping[str, Value]) -> dict[str, float]:
+    known = metrics()
+    columns: dict[str, float] = {}
+    for name, value in scores.items():
+        number = math.inf if value.value is None else value.value
+        if name in known:
+            numbers = (number, value.total, value.count)
+            columns |= dict(zip(known[name].columns, numbers, strict=False))
+        else:
+            columns[name] = number
     return columns
-
-
-def pooled_rms(sums_of_squares: Iterable[float], counts: Iterable[float]) -> float:
-    """Return the RMS over several runs: root of all squares over all samples, never a mean of RMS.
-
-    Examples
-    --------
-    >>> pooled_rms([4.0, 0.0], [1, 1])
-    1.4142135623730951
-    """
-    total = float(sum(counts))
-    return math.sqrt(math.fsum(sums_of_squares) / total) if total else math.nan

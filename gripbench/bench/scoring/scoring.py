@@ -1,15 +1,9 @@
-"""Scores of one run: estimates against truth, every target, in two compiled passes.
+"""Estimates and truth of one run into the value of every metric, by target.
 
 Samples before the recording's `score_from`, and those whose truth is not finite (a log without a
 reference there), do not count. An estimate that is not finite, scored or not, makes the run
-`diverged`.
-
-Convergence time
-    Time [s] from the start of scoring, or from the recording's note `friction_step` if that is
-    later, to the first sample from which the absolute error stays within `BAND` of the largest
-    absolute truth for `HOLD` seconds.
-Response of the friction
-    See `gripbench.bench.scoring.friction_response`.
+`diverged`. Angles are compared on the circle: an estimate is moved by whole turns to the branch of
+the truth, so that no metric sees an error beyond half a turn.
 """
 
 from __future__ import annotations
@@ -17,23 +11,19 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
-from gripbench.bench.running.rows import UTILISATION_BANDS, Stratum, TargetScore
-from gripbench.bench.scoring.friction_response import friction_response, is_available_friction
+from gripbench.bench.scoring.metric import Context, Floats, Value
+from gripbench.bench.scoring.metrics import metrics
 from gripbench.envs.recordings import Recording
-from gripbench.envs.signals import VARIANCE
+from gripbench.envs.signals import VARIANCE, signal
 from gripbench.errors import GripbenchError
 
-BAND = 0.1
-"""Width of the convergence band: share of the largest absolute truth."""
+Scores = dict[str, Value]
+"""Values of one target in one run, by the name of the metric."""
 
-HOLD = 0.5
-"""Time [s] for which the error has to stay within the band."""
-
-_EDGES = np.array([edge for _, edge, _ in UTILISATION_BANDS[1:]])
+_LARGEST = math.sqrt(np.finfo(float).max)
 
 
 class DivergedError(GripbenchError):
@@ -55,8 +45,8 @@ def score(
     outputs: tuple[str, ...],
     targets: tuple[str, ...],
     recording: Recording,
-) -> dict[str, TargetScore]:
-    """Return the scores of a run by target.
+) -> dict[str, Scores]:
+    """Return the value of every metric that applies, by target and metric.
 
     Parameters
     ----------
@@ -69,12 +59,18 @@ def score(
     recording
         The run; truth of shape (n,).
 
+    Returns
+    -------
+    A target without a scored sample is left out, a metric that has nothing to say too.
+
     Raises
     ------
     EstimateError
         If the estimates have another shape or other fields.
     DivergedError
-        If one of them is not finite.
+        If one of them is not finite, or too large to be squared.
+    MetricError
+        If a metric fails.
     """
     check_estimates(estimates, outputs, len(recording.truth))
     truth = recording.truth
@@ -83,39 +79,73 @@ def score(
         first = _first_not_finite(estimates[name])
         if first >= 0:
             raise DivergedError(f"{name} is {estimates[name][first]} from t = {times[first]:.6g} s")
-    known = truth.dtype.names or ()
-    nothing = np.empty(0)
-    used = _column(truth, "utilisation") if "utilisation" in known else nothing
-    start = max(recording.score_from, recording.notes.get("friction_step", 0.0))
+    inside = times >= recording.score_from
     scores = {}
     for name in targets:
-        variance = name + VARIANCE
-        values = _column(estimates, variance) if variance in outputs else nothing
-        sums = _sums(
-            times,
-            _column(estimates, name),
-            _column(truth, name),
-            used,
-            values,
-            recording.score_from,
-            start,
-        )
-        scored = _score_of(sums)
-        if scored is None:
+        counted = inside & np.isfinite(truth[name])
+        if not counted.any():
+            continue
+        true = truth[name][counted]
+        estimate = on_branch(name, estimates[name][counted], true)
+        if _too_large(estimate, true):
             raise DivergedError(f"{name} is too large to be squared")
-        if scored.count and is_available_friction(name) and "accel_y" in known:
-            response = friction_response(
-                times,
-                _column(estimates, name),
-                _column(truth, name),
-                _column(truth, "accel_y"),
-                recording.score_from,
-                recording.notes.get("mu_jump_time", math.nan),
-            )
-            scored = scored.model_copy(update={"friction": response})
-        if scored.count:
-            scores[name] = scored
+        variance = name + VARIANCE
+        context = Context(
+            target=name,
+            score_from=recording.score_from,
+            notes=recording.notes,
+            variance=estimates[variance][counted] if variance in outputs else None,
+            channels=_Channels(truth, counted),
+        )
+        values = {
+            metric.name: metric.of_run(times[counted], estimate, true, context)
+            for metric in metrics().values()
+        }
+        scores[name] = {key: value for key, value in values.items() if value is not None}
     return scores
+
+
+class _Channels:
+    """Channels of the truth at the samples that count; each is cut out once."""
+
+    def __init__(self, truth: npt.NDArray[Any], counted: npt.NDArray[np.bool_]) -> None:
+        self._truth, self._counted = truth, counted
+        self._found: dict[str, Floats] = {}
+
+    def __call__(self, name: str) -> Floats | None:
+        if name not in (self._truth.dtype.names or ()):
+            return None
+        if name not in self._found:
+            self._found[name] = self._truth[name][self._counted]
+        return self._found[name]
+
+
+def on_branch(name: str, estimate: Floats, truth: Floats) -> Floats:
+    """Return an angle's estimate moved by whole turns to within half a turn of the truth.
+
+    Parameters
+    ----------
+    name
+        Signal; of one that is no angle the estimate comes back as it is.
+    estimate, truth
+        Shape (n,).
+
+    Examples
+    --------
+    >>> on_branch("mu", np.array([7.0]), np.array([0.5]))
+    array([7.])
+    >>> float(on_branch("yaw", np.array([3.1]), np.array([-3.1]))[0])
+    -3.1831853071795863
+    """
+    if not signal(name).angle:
+        return estimate
+    turns = np.round((estimate - truth) / (2.0 * np.pi))
+    return np.where(turns == 0.0, estimate, estimate - 2.0 * np.pi * turns)
+
+
+def _too_large(estimate: Floats, truth: Floats) -> bool:
+    with np.errstate(over="ignore"):
+        return bool(np.abs(estimate - truth).max() * math.sqrt(len(truth)) > _LARGEST)
 
 
 def check_estimates(estimates: Any, outputs: tuple[str, ...], length: int) -> None:
@@ -139,72 +169,6 @@ def check_estimates(estimates: Any, outputs: tuple[str, ...], length: int) -> No
             raise EstimateError(f"the estimate '{name}' is not of type float64")
 
 
-def _column(records: npt.NDArray[Any], name: str) -> npt.NDArray[np.float64]:
-    return np.ascontiguousarray(records[name])
-
-
 def _first_not_finite(values: npt.NDArray[np.float64]) -> int:
     finite = np.isfinite(values)
     return -1 if finite.all() else int(np.argmin(finite))
-
-
-def _score_of(sums: npt.NDArray[np.float64]) -> TargetScore | None:
-    """Return the score of a row that `_sums` made; None where a sum overflowed."""
-    count, squares, total, peak, convergence, nees = sums[:6]
-    if not np.isfinite(sums[:4]).all() or not np.isfinite(sums[6:]).all():
-        return None
-    bands = sums[6:].reshape(-1, 2)
-    return TargetScore(
-        rms=math.sqrt(squares / count) if count else 0.0,
-        sum_of_squares=float(squares),
-        count=int(count),
-        peak=float(peak),
-        bias=float(total / count) if count else 0.0,
-        convergence_time=None if math.isnan(convergence) else float(convergence),
-        by_utilisation={
-            band[0]: Stratum(sum_of_squares=float(part), count=int(number))
-            for band, (part, number) in zip(UTILISATION_BANDS, bands, strict=True)
-            if number
-        },
-        mean_nees=float(nees / count) if count and math.isfinite(nees) else None,
-    )
-
-
-@numba.njit(cache=True, error_model="numpy", nogil=True)
-def _sums(times, estimate, truth, used, variance, score_from, start):  # type: ignore[no-untyped-def]
-    """Return count, sum of squares, sum, peak, convergence time, NEES, then squares by band."""
-    out = np.zeros(6 + 2 * (_EDGES.size + 1))
-    largest = 0.0
-    nees = 0.0 if variance.size else np.nan
-    for k in range(times.size):
-        if times[k] < score_from or not np.isfinite(truth[k]):
-            continue
-        error = estimate[k] - truth[k]
-        largest = max(largest, abs(truth[k]))
-        out[0] += 1.0
-        out[1] += error * error
-        out[2] += error
-        out[3] = max(out[3], abs(error))
-        if variance.size:
-            nees += error * error / variance[k] if variance[k] > 0.0 else np.nan
-        if used.size and np.isfinite(used[k]):
-            band = 0
-            while band < _EDGES.size and used[k] >= _EDGES[band]:
-                band += 1
-            out[6 + 2 * band] += error * error
-            out[7 + 2 * band] += 1.0
-    out[5] = nees
-    out[4] = np.nan
-    since = np.nan
-    for k in range(times.size):
-        if times[k] < start or not np.isfinite(truth[k]):
-            continue
-        if abs(estimate[k] - truth[k]) > BAND * largest:
-            since = np.nan
-            continue
-        if np.isnan(since):
-            since = times[k]
-        if times[k] - since >= HOLD:
-            out[4] = since - start
-            break
-    return out
