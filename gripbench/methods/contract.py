@@ -126,7 +126,7 @@ class CompiledMethod:
         if chosen.vehicle_parameters is not None:
             self.vehicle_parameters = chosen.vehicle_parameters
         self.step = chosen.step or type(self).step
-        self._types = _record_types(self)
+        self.record_types = _record_types(self)
         self._records: drivers.Records | None = None
 
     def reset(self, vehicle: Mapping[str, float], dt: float) -> None:
@@ -172,16 +172,16 @@ class CompiledMethod:
         return (*self.estimates, *(name + VARIANCE for name in self.variances))
 
     def _fresh(self, vehicle: Mapping[str, float], length: int) -> drivers.Records:
-        params = np.zeros(1, self._types.params)
+        params = np.zeros(1, self.record_types.params)
         for name, value in require(dict(vehicle), self.vehicle_parameters, self.name).items():
             params[name] = value
         for parameter in self.parameters:
             params[parameter.name] = parameter.number(self.settings[parameter.name])
         records = drivers.Records(
-            state=np.zeros(1, self._types.state),
-            obs=np.zeros(1, self._types.obs),
+            state=np.zeros(1, self.record_types.state),
+            obs=np.zeros(1, self.record_types.obs),
             params=params,
-            est=np.zeros(length, self._types.est),
+            est=np.zeros(length, self.record_types.est),
         )
         if self.start is not None:
             type(self).start(records.state[0], records.params[0])  # type: ignore[misc]
@@ -189,14 +189,16 @@ class CompiledMethod:
 
 
 @dataclass(frozen=True)
-class _RecordTypes:
+class RecordTypes:
+    """Types of the four records of a step."""
+
     state: np.dtype[Any]
     obs: np.dtype[Any]
     params: np.dtype[Any]
     est: np.dtype[Any]
 
 
-def _record_types(method: CompiledMethod) -> _RecordTypes:
+def _record_types(method: CompiledMethod) -> RecordTypes:
     for name in (*method.sensors, *method.estimates):
         signal(name)
     own = tuple(parameter.name for parameter in method.parameters)
@@ -204,7 +206,7 @@ def _record_types(method: CompiledMethod) -> _RecordTypes:
     if clash:
         raise InputError(f"{method.name}: parameter '{clash.pop()}' is also a vehicle parameter")
     params = [(name, np.float64) for name in (*method.vehicle_parameters, *own)]
-    return _RecordTypes(
+    return RecordTypes(
         state=method.state,
         obs=drivers.observation_type(method.sensors),
         params=np.dtype(params or [("none", np.float64)]),

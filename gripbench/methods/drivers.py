@@ -58,6 +58,14 @@ def online(method: CompiledMethod, records: Records, obs: Mapping[str, float]) -
     return dict(zip(method.outputs, records.est[0].item(), strict=True))
 
 
+def compile_single(method: CompiledMethod) -> None:
+    """Compile what `online` calls, without a call of the step."""
+    types = method.record_types
+    names = ("state", "obs", "params", "est")
+    signature = tuple(numba.typeof(np.zeros(1, getattr(types, name))) for name in names)
+    _single(method.step).compile(signature)
+
+
 def batch(
     method: CompiledMethod, records: Records, observations: npt.NDArray[Any]
 ) -> npt.NDArray[Any]:

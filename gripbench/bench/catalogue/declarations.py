@@ -9,7 +9,7 @@ import pickle
 import re
 import sys
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
@@ -126,57 +126,169 @@ def declaration_of(
     InputError
         If a declaration is missing or names a signal that does not exist.
     """
-    kind = type(method).__name__
-    name = getattr(method, "name", None)
-    if not isinstance(name, str) or not re.fullmatch(r"[a-z][a-z0-9_]*", name):
-        raise InputError(
-            f"{kind}: set the class attribute 'name' to a string of lower case letters, digits "
-            f"and underscores (it is {name!r})"
-        )
+    compiled = isinstance(method, CompiledMethod)
+    module = sys.modules.get(type(method).__module__)
+    given = {item: getattr(method, item, None) for item in (*_TEXTS, *_NAMES)}
+    name = given["name"] if isinstance(given["name"], str) else type(method).__name__
     for function in ("reset", "update"):
         if not callable(getattr(method, function, None)):
             raise InputError(f"{name}: add the method '{function}' (see 'gripbench new method')")
-    sensors = _names(method, name, "sensors", required=True)
-    estimates = _names(method, name, "estimates", required=True)
-    variances = _names(method, name, "variances")
+    if compiled:
+        check_names(f"{name}: 'parameters'", [item.name for item in method.parameters])
+        check_names(f"{name}: 'variants'", list(method.variants))
+    given["variant"] = method.variant if compiled else variant
+    given["settings"] = dict(method.settings) if compiled else dict(parameters)
+    given["baseline"] = bool(getattr(method, "baseline", False))
+    given["file"] = str(getattr(module, "__file__", None) or "")
+    return declaration_from(given, type(method).__name__)
+
+
+_TEXTS = ("name", "title", "reference")
+_NAMES = ("sensors", "estimates", "variances", "vehicle_parameters")
+
+LONGEST_NAME = 100
+"""Largest number of characters of a name, which is also that of a file."""
+
+LONGEST_TITLE = 200
+"""Largest number of characters of a title."""
+
+LONGEST_TEXT = 1000
+"""Largest number of characters that are kept of any text that a method makes."""
+
+_OF_WINDOWS = {
+    "con", "prn", "aux", "nul", "conin$", "conout$",
+    *(f"{port}{number}" for port in ("com", "lpt") for number in range(10)),
+}  # fmt: skip
+
+
+def declaration_from(given: Mapping[str, Any], kind: str = "method") -> Declaration:
+    """Return a declaration from attributes, after checking each.
+
+    Parameters
+    ----------
+    given
+        The fields of a `Declaration`, as a method has them or its process sent them.
+    kind
+        What to call the method where it has no name.
+
+    Raises
+    ------
+    InputError
+        If one is missing, is not of its type or names a signal that does not exist.
+    """
+    name = given.get("name")
+    if not isinstance(name, str) or not re.fullmatch(r"[a-z][a-z0-9_]*", name):
+        raise InputError(
+            f"{kind}: set the class attribute 'name' to a string of lower case letters, digits "
+            f"and underscores (it is {printable(repr(name))})"
+        )
+    check_names("'name'", [name])
+    title = given.get("title")
+    title = printable(name if title is None else str(title))
+    if len(title) > LONGEST_TITLE:
+        raise InputError(
+            f"{name}: 'title' has {len(title)} characters; at most {LONGEST_TITLE} are allowed"
+        )
+    sensors = _signals(given, name, "sensors", required=True)
+    estimates = _signals(given, name, "estimates", required=True)
+    variances = _signals(given, name, "variances")
     for estimate in variances:
         if estimate not in estimates:
             raise InputError(f"{name}: 'variances' names '{estimate}', which it does not estimate")
-    compiled = isinstance(method, CompiledMethod)
-    module = sys.modules.get(type(method).__module__)
+    settings, variant = given.get("settings"), given.get("variant")
+    if not isinstance(settings, Mapping) or not isinstance(variant, str):
+        raise InputError(f"{name}: its settings are no table of values")
+    for key, value in settings.items():
+        if not isinstance(key, str) or not isinstance(value, float | int | str | bool | None):
+            raise InputError(f"{name}: the setting '{key}' is {type(value).__name__}")
     return Declaration(
         name=name,
-        title=str(getattr(method, "title", name)),
-        reference=str(getattr(method, "reference", "")),
+        title=title,
+        reference=printable(str(given.get("reference") or "")),
         sensors=sensors,
         estimates=estimates,
         variances=variances,
-        vehicle_parameters=tuple(getattr(method, "vehicle_parameters", ())),
-        variant=method.variant if compiled else variant,
-        settings=dict(method.settings) if compiled else dict(parameters),
-        file=str(getattr(module, "__file__", None) or ""),
-        baseline=bool(getattr(method, "baseline", False)),
+        vehicle_parameters=_names(given, name, "vehicle_parameters", "vehicle parameter"),
+        variant=variant,
+        settings=dict(settings),
+        file=str(given.get("file") or ""),
+        baseline=given.get("baseline") is True,
     )
 
 
-def _names(method: Any, name: str, attribute: str, required: bool = False) -> tuple[str, ...]:
-    value = getattr(method, attribute, None)
-    if value is None and not required:
-        return ()
-    empty = required and not value and attribute != "sensors"  # a constant reads nothing
-    if isinstance(value, str) or not isinstance(value, list | tuple) or empty:
-        raise InputError(
-            f"{name}: set the class attribute '{attribute}' to a tuple of signal names, such as "
-            f"('accel_x',) (it is {value!r})"
+def check_names(what: str, names: Sequence[Any]) -> None:
+    """Raise InputError unless names are different ones that any system can store.
+
+    Parameters
+    ----------
+    what
+        What they are the names of, for the message.
+    names
+        Names of methods, variants, parameters or scenarios.
+    """
+    for name in names:
+        if not isinstance(name, str) or not name:
+            raise InputError(f"{what}: a name is {printable(repr(name))}; give a text")
+        wrong = (
+            f"has {len(name)} characters; at most {LONGEST_NAME} are allowed"
+            if len(name) > LONGEST_NAME
+            else "is a name that an operating system keeps for itself"
+            if name.split(".")[0].lower() in _OF_WINDOWS
+            else "ends in a dot or a space, which not every system can store"
+            if name[-1] in ". "
+            else "holds a character that not every system can store; use letters, digits, _ and -"
+            if re.search(r'[<>:"/\\|?*\x00-\x1f\x7f\ud800-\udfff]', name)
+            else ""
         )
+        if wrong:
+            raise InputError(f"{what}: the name {printable(repr(name), 120)} {wrong}")
+        if list(names).count(name) > 1:
+            raise InputError(f"{what} holds '{name}' twice")
+
+
+def printable(text: str, longest: int = LONGEST_TEXT) -> str:
+    """Return text that can be stored and printed: no lone surrogates, one line, not too long."""
+    text = text[: 4 * longest].encode("utf-8", "replace").decode("utf-8")
+    text = " ".join(re.sub(r"[\x00-\x1f\x7f-\x9f]", " ", text).split())
+    return text if len(text) <= longest else text[: longest - 3] + "..."
+
+
+def _signals(
+    given: Mapping[str, Any], name: str, attribute: str, required: bool = False
+) -> tuple[str, ...]:
+    value = _names(given, name, attribute, "signal", required)
     for item in value:
         try:
             signal(item)
         except GripbenchError:
             raise InputError(
-                f"{name}: '{attribute}' names the unknown signal '{item}': "
-                f"{nearest(str(item), SIGNALS)}"
+                f"{name}: '{attribute}' names the unknown signal '{printable(item)}': "
+                f"{nearest(item, SIGNALS)}"
             ) from None
+    if "time" in value:
+        raise InputError(f"{name}: '{attribute}' names 'time', which every sample carries anyway")
+    return value
+
+
+def _names(
+    given: Mapping[str, Any], name: str, attribute: str, of: str, required: bool = False
+) -> tuple[str, ...]:
+    value = given.get(attribute)
+    if value is None and not required:
+        return ()
+    if (
+        not isinstance(value, list | tuple)
+        or (required and not value and attribute != "sensors")  # a constant reads nothing
+        or not all(isinstance(item, str) for item in value)
+    ):
+        raise InputError(
+            f"{name}: set the class attribute '{attribute}' to a tuple of {of} names, such as "
+            f"('{'mass' if of == 'vehicle parameter' else 'accel_x'}',) "
+            f"(it is {printable(repr(value), 120)})"
+        )
+    for item in value:
+        if value.count(item) > 1:
+            raise InputError(f"{name}: '{attribute}' names '{printable(item)}' twice")
     return tuple(value)
 
 
@@ -235,7 +347,10 @@ def describe_error(error: BaseException) -> str:
     place = error.__traceback__
     while place is not None and place.tb_next is not None:
         place = place.tb_next
-    message = " ".join(str(error).split())
+    try:
+        message = printable(str(error))
+    except Exception:  # its own code makes the text
+        message = "its message cannot be read"
     text = f"{type(error).__name__}: {message}" if message else type(error).__name__
     if isinstance(error, GripbenchError):
         return message

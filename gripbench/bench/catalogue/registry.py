@@ -232,7 +232,7 @@ def choose_method(
     isolated = not (source.kind == "module" and source.target.startswith("gripbench.methods."))
     if isolated and source.kind != "value":
         from gripbench.bench.running.sandbox import (
-            declare,  # a plug-in's code runs in its cage only
+            declare,  # a plug-in's code runs in its sandbox only
         )
 
         declaration = declare(source, variant, settings)

@@ -10,18 +10,17 @@ import atexit
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from gripbench.bench.catalogue.declarations import Source, describe_error
 from gripbench.bench.catalogue.registry import MethodSpec
 from gripbench.bench.running.execution import Outcome, SkippedError, execute, missing
 from gripbench.bench.running.fingerprints import versions
+from gripbench.bench.running.processes import stop_starters
 from gripbench.bench.running.recorded_scenarios import RecordedScenario, judged, recording_of
 from gripbench.bench.running.rows import Row, Status
-from gripbench.bench.running.sandbox import Cage, CellFailure, Limits
+from gripbench.bench.running.sandbox import CellFailure, Limits, Sandbox
 from gripbench.bench.running.store import row_path
 from gripbench.bench.scoring.scoring import DivergedError, score, targets_of
-from gripbench.envs.recordings import Recording, select_channels
+from gripbench.envs.recordings import Recording
 from gripbench.envs.scenarios import Scenario
 from gripbench.sources import digest
 
@@ -145,15 +144,14 @@ def _outcome(cell: Cell, recording: Recording, limits: Limits, timed: bool) -> O
             period,
             timed,
         )
-    return _cage(spec.source, limits).execute(
+    return _sandbox(spec.source, spec.digest, limits).execute(
         spec.source,
         spec.declaration,
         spec.variant,
         spec.parameters,
         recording.vehicle,
-        np.asarray(select_channels(recording.observations, spec.declaration.sensors)),
+        recording.observations,
         period,
-        recording.seed,
     )
 
 
@@ -179,22 +177,28 @@ def _row(cell: Cell, targets: tuple[str, ...], status: Status, reason: str) -> R
     )
 
 
-_cages: dict[tuple[Source, Limits], Cage] = {}
+MOST_SANDBOXES = 8
+"""Largest number of plug-ins whose processes wait for their next cell."""
+
+_sandboxes: dict[tuple[Source, str, Limits], Sandbox] = {}
 
 
-def _cage(source: Source, limits: Limits) -> Cage:
-    """Return this process's cage of a method; it lives as long as the process."""
-    key = (source, limits)
-    if key not in _cages:
-        _cages[key] = Cage(limits)
-    return _cages[key]
+def _sandbox(source: Source, digest: str, limits: Limits) -> Sandbox:
+    """Return this process's sandbox of a method in one state of its source."""
+    key = (source, digest, limits)
+    if key not in _sandboxes:
+        while len(_sandboxes) >= MOST_SANDBOXES:
+            _sandboxes.pop(next(iter(_sandboxes))).close()
+        _sandboxes[key] = Sandbox(limits)
+    return _sandboxes[key]
 
 
-def close_cages() -> None:
+def close_sandboxes() -> None:
     """End the processes of all isolated methods that this process started."""
-    for cage in _cages.values():
-        cage.close()
-    _cages.clear()
+    for sandbox in _sandboxes.values():
+        sandbox.close()
+    _sandboxes.clear()
+    stop_starters()
 
 
-atexit.register(close_cages)
+atexit.register(close_sandboxes)

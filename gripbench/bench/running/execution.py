@@ -112,7 +112,7 @@ def execute(
     else:
         estimates, calls = _online(method, declaration, paper, selected)
         batch = float(calls.mean())
-    return Outcome(estimates, _runtime(batch, calls, period))
+    return Outcome(estimates, runtime_of(calls, period, batch))
 
 
 def run_online(
@@ -148,13 +148,47 @@ def _online(
         began = clock()
         given = update(obs)
         took[k] = clock() - began
-        try:
-            values[k] = [given[name] for name in outputs]
-        except (KeyError, TypeError, ValueError, IndexError):
-            raise _wrong(given, outputs) from None
-        if len(given) != len(outputs):
-            raise _wrong(given, outputs)
+        values[k] = numbers_of(given, outputs)
     return estimates, took.astype(np.float64) * 1e-9
+
+
+def numbers_of(given: Any, outputs: tuple[str, ...]) -> list[float]:
+    """Return what `update` returned as floats, in the order of the declared outputs.
+
+    Only a real number counts as one: no text that looks like one, no bool, no array, no masked,
+    complex or date value. NaN and infinity are numbers here; scoring finds them.
+
+    Raises
+    ------
+    EstimateError
+        If an estimate is missing or is no number.
+    UndeclaredChannelError
+        If there is one that was not declared.
+    """
+    try:
+        values = [given[name] for name in outputs]
+    except (KeyError, TypeError, IndexError):
+        raise _wrong(given, outputs) from None
+    if len(given) != len(outputs):
+        raise _wrong(given, outputs)
+    return [
+        value if type(value) is float else _number(name, value)
+        for name, value in zip(outputs, values, strict=True)
+    ]
+
+
+def _number(name: str, value: Any) -> float:
+    if not isinstance(value, Real) or isinstance(value, bool):
+        shape = f" of shape {value.shape}" if isinstance(value, np.ndarray) else ""
+        raise EstimateError(f"the estimate '{name}' is {_kind(value)}{shape}; return a number")
+    try:
+        return float(value)
+    except OverflowError:
+        raise EstimateError(f"the estimate '{name}' is too large for a float") from None
+
+
+def _kind(value: Any) -> str:
+    return "masked" if value is np.ma.masked else type(value).__name__
 
 
 def _wrong(given: Any, outputs: tuple[str, ...]) -> GripbenchError:
@@ -165,21 +199,32 @@ def _wrong(given: Any, outputs: tuple[str, ...]) -> GripbenchError:
         )
     for name in outputs:
         if name not in given:
-            hint = nearest(name, given) if given else "it is empty"
+            hint = nearest(name, [str(key) for key in given]) if given else "it is empty"
             return EstimateError(
                 f"the estimate '{name}' is declared but update does not return it: {hint}"
             )
-        if not isinstance(given[name], Real):
-            return EstimateError(
-                f"the estimate '{name}' is {type(given[name]).__name__}; return a number"
-            )
-    surplus = next(name for name in given if name not in outputs)
+    surplus = next((name for name in given if name not in outputs), "")
     return UndeclaredChannelError(
         f"update returns the estimate '{surplus}', which is not among its estimates"
     )
 
 
-def _runtime(batch: float, calls: npt.NDArray[np.float64], period: float) -> Runtime:
+def runtime_of(
+    calls: npt.NDArray[np.float64], period: float, batch: float | None = None
+) -> Runtime:
+    """Return the times of single calls [s], shape (n,), as a runtime.
+
+    Parameters
+    ----------
+    calls
+        Times of single calls; may be empty.
+    period
+        Nominal time [s] between samples.
+    batch
+        Time of a step [s] in one loop; by default the mean of the calls.
+    """
+    if batch is None:
+        batch = float(calls.mean())
     if not len(calls):
         return Runtime(batch=batch)
     return Runtime(

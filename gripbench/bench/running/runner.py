@@ -16,7 +16,7 @@ from typing import Any
 
 from gripbench.bench.catalogue.registry import MethodSpec
 from gripbench.bench.running.backends import Backend, WorkerLostError
-from gripbench.bench.running.cells import Cell, Task, cell_of, close_cages, run_tasks
+from gripbench.bench.running.cells import Cell, Task, cell_of, close_sandboxes, run_tasks
 from gripbench.bench.running.fingerprints import world_digest
 from gripbench.bench.running.recorded_scenarios import RecordedScenario, on_recording
 from gripbench.bench.running.rows import Row
@@ -157,7 +157,7 @@ def run_plan(
                     if (cell.scenario.name, cell.method.label, cell.seed) not in done
                 ]
     finally:
-        close_cages()
+        close_sandboxes()
         end_declaring()
     report.seconds = time.perf_counter() - began
     return report

@@ -1,37 +1,48 @@
-"""The cage: a process of its own for a method that did not ship with gripbench.
+"""The sandbox: runs a method that did not ship with gripbench in a confined process of its own.
 
-The process loads the method, takes one recording after the other and answers with estimates. It
-is killed when a limit of time is passed, and cannot take more memory than allowed; whatever the
-method does to it (an endless loop, `os._exit`, a segmentation fault), only the cell that it was
-working on is lost, and the next cell gets a new process.
+A recording goes in sample by sample, each when the estimates of the one before have come back, so
+that no method holds a sample of the future; estimates come out, or the reason why there are none.
+Whatever the method does to its process (an endless loop, `os._exit`, a segmentation fault), only
+the cell that it was working on is lost. `plugin_process` is the other side.
 """
 
 from __future__ import annotations
 
-import contextlib
-import ctypes
+import base64
+import hashlib
 import os
-import random
 import signal as signals
-import subprocess
-import sys
-import threading
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
-from multiprocessing.connection import Connection, Pipe
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from gripbench.bench.catalogue.declarations import (
-    Declaration,
-    Source,
-    declaration_of,
-    describe_error,
+from gripbench.bench.catalogue.declarations import Declaration, Source, declaration_from, printable
+from gripbench.bench.running.execution import Outcome, runtime_of
+from gripbench.bench.running.lines import LateError, Line
+from gripbench.bench.running.messages import (
+    ESTIMATES,
+    FAILURE,
+    FINISHED,
+    HEADER,
+    read_message,
+    reply_type,
+    requests_of,
 )
-from gripbench.bench.running.execution import Outcome, SkippedError, execute
+from gripbench.bench.running.processes import PluginProcess, start_plugin, stop_starters
+from gripbench.envs.recordings import select_channels
+from gripbench.envs.signals import record_type
 from gripbench.errors import GripbenchError, InputError
+
+LOADING = 60.0
+"""Time [s] that loading and compiling a plug-in may take; no cell's limit counts it."""
+
+ENDING = 10.0
+"""Time [s] in which a process that has said that it is done has to end."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +52,7 @@ class Limits:
     Attributes
     ----------
     time
-        Wall-clock time [s], loading included.
+        Wall-clock time [s] of its samples; loading and compiling come before.
     memory
         Memory [bytes] beyond what the empty process has.
     """
@@ -58,8 +69,17 @@ class CellFailure(GripbenchError):  # noqa: N818 - a result of a cell, not a mis
         self.status = status
 
 
-class Cage:
-    """A process that runs one method.
+@dataclass(frozen=True)
+class Settings:
+    """Which plug-in, and with what its constructor is called."""
+
+    source: Source
+    variant: str
+    parameters: Mapping[str, Any]
+
+
+class Sandbox:
+    """Processes of plug-ins, one after the other: the last one that was asked for is kept.
 
     Parameters
     ----------
@@ -69,13 +89,18 @@ class Cage:
 
     def __init__(self, limits: Limits) -> None:
         self.limits = limits
-        self._process: subprocess.Popen[bytes] | None = None
-        self._connection: Connection | None = None
+        self._process: PluginProcess | None = None
+        self._loaded: tuple[Settings, Declaration] | None = None
 
     def declare(self, source: Source, variant: str, parameters: dict[str, Any]) -> Declaration:
-        """Return what a method declares."""
-        answer: Declaration = self._ask("declare", source, variant, parameters)
-        return answer
+        """Return what a method declares.
+
+        Raises
+        ------
+        CellFailure
+            If it cannot be loaded.
+        """
+        return self._load(Settings(source, variant, parameters))
 
     def execute(
         self,
@@ -83,147 +108,258 @@ class Cage:
         declaration: Declaration,
         variant: str,
         parameters: dict[str, Any],
-        vehicle: dict[str, float],
+        vehicle: Mapping[str, float],
         observations: npt.NDArray[Any],
         period: float,
-        seed: int,
     ) -> Outcome:
         """Run a method over a recording.
+
+        Parameters
+        ----------
+        source, variant, parameters
+            The method.
+        declaration
+            What it declared before; it must declare the same now.
+        vehicle
+            Vehicle parameters by name.
+        observations
+            Structured array, shape (n,), with at least the declared channels and `time`.
+        period
+            Nominal time [s] between samples.
 
         Raises
         ------
         CellFailure
             With status `failed`, `timeout` or `skipped` and the reason.
         """
-        answer: Outcome = self._ask(
-            "execute", source, declaration, variant, parameters, vehicle, observations, period, seed
-        )
-        return answer
+        found = self._load(Settings(source, variant, parameters))
+        if (found.sensors, found.outputs) != (declaration.sensors, declaration.outputs):
+            raise CellFailure("failed", "it declares other sensors or estimates than before")
+        selected = select_channels(observations, found.sensors)
+        return self._run(found, vehicle, selected, period)
 
     def close(self) -> None:
-        """End the process."""
-        if self._connection is not None:
-            self._connection.close()
-        if self._process is not None:
-            with contextlib.suppress(OSError):
-                self._process.kill()
-            self._process.wait()
-        self._process = self._connection = None
+        """End the process and everything that it started."""
+        process, self._process, self._loaded = self._process, None, None
+        if process is not None:
+            process.end(grace=0.0)
 
-    def _ask(self, *request: Any) -> Any:
-        if self._process is None:
-            self._start()
-        deadline = time.monotonic() + self.limits.time
-        connection = self._connection
-        assert connection is not None
+    def _load(self, settings: Settings) -> Declaration:
+        if self._process is not None and self._loaded is not None and self._process.alive:
+            loaded, declaration = self._loaded
+            if loaded == settings:
+                return declaration
+        self.close()
+        self._process = process = start_plugin()
+        line, limit = process.line, max(self.limits.time, LOADING)
+        deadline = time.monotonic() + limit
+        answer = self._answer(line, deadline, limit, _loading(settings, self.limits))
         try:
-            # Sending may block on a process that no longer reads: it counts against the limit.
-            with _Alarm(self, self.limits.time) as alarm:
-                connection.send((list(sys.path), request))
-                ready = connection.poll(max(deadline - time.monotonic(), 0.0))
-                answer = connection.recv() if ready else None
-            if alarm.rang or not ready:
-                self.close()
-                raise CellFailure(
-                    "timeout", f"stopped after the time limit of {self.limits.time:g} s"
-                )
-        except (EOFError, OSError):
-            rang = alarm.rang
-            reason = self._last_words()
+            declaration = declaration_from(answer["declaration"])
+        except (KeyError, TypeError, InputError) as error:
             self.close()
-            if rang:
-                raise CellFailure(
-                    "timeout", f"stopped after the time limit of {self.limits.time:g} s"
-                ) from None
-            raise CellFailure("failed", reason) from None
-        except CellFailure:
-            raise
-        except Exception as error:  # an answer that cannot be read
+            raise CellFailure("failed", f"its declaration cannot be read: {error}") from None
+        process.shared = process.forks and answer.get("shared") is True
+        self._loaded = (settings, declaration)
+        return declaration
+
+    def _run(
+        self,
+        declaration: Declaration,
+        vehicle: Mapping[str, float],
+        observations: npt.NDArray[Any],
+        period: float,
+    ) -> Outcome:
+        process = self._process
+        assert process is not None
+        limit = self.limits.time
+        deadline = time.monotonic() + limit
+        times = observations["time"]
+        content = {
+            "vehicle": dict(vehicle),
+            "step": float(times[1] - times[0]) if len(times) > 1 else 0.0,
+            "seed": _generator_seed(declaration, observations),
+        }
+        line = process.open_cell(content)
+        try:
+            hello = self._answer(line, deadline, limit)
+            replies = self._stream(line, hello.get("process"), declaration, observations, deadline)
+            self._finish(line)
+        finally:
+            if process.shared:
+                line.close()
+                if process.alive and not process.finish_cell(ENDING):
+                    self.close()
+            else:
+                self.close()
+        estimates = np.empty(len(observations), record_type(declaration.outputs))
+        values = estimates.view(np.float64).reshape(len(observations), -1)
+        values[:] = replies["estimates"]
+        return Outcome(estimates, runtime_of(replies["took"] * 1e-9, period))
+
+    def _stream(
+        self,
+        line: Line,
+        process: object,
+        declaration: Declaration,
+        observations: npt.NDArray[Any],
+        deadline: float,
+    ) -> npt.NDArray[Any]:
+        """Give the samples one by one; return the replies, shape (n,)."""
+        requests = requests_of(observations)
+        heads = np.zeros((len(requests), 4), "=u8")
+        heads[:, 0], heads[:, 1] = requests["nonce"], requests["index"]
+        heads[:, 2] = process if isinstance(process, int) and process > 0 else 0
+        heads[:, 3] = ESTIMATES
+        heads[-1, 3] = FINISHED
+        kind = reply_type(len(declaration.outputs))
+        size, width, head = requests.itemsize, kind.itemsize, HEADER.size
+        given, expected = requests.tobytes(), heads.tobytes()
+        replies = bytearray(width * len(observations))
+        try:
+            for k in range(len(requests)):
+                line.put(given[k * size : (k + 1) * size], deadline)
+                reply = line.receive(width, deadline)
+                if reply[:head] != expected[k * head : (k + 1) * head]:
+                    self._fail(line, reply, expected[k * head : (k + 1) * head], deadline)
+                if k < len(observations):
+                    replies[k * width : (k + 1) * width] = reply
+            read_message(lambda length: line.receive(length, deadline))
+        except (LateError, EOFError, OSError) as error:
+            self._lost(error, self.limits.time)
+        except ValueError as error:
             self.close()
             raise CellFailure("failed", f"its answer cannot be read: {error}") from None
-        status, content = answer  # type: ignore[misc]
+        return np.frombuffer(bytes(replies), kind)
+
+    def _fail(self, line: Line, reply: bytes, expected: bytes, deadline: float) -> None:
+        """Raise what a reply says that does not hold the estimates that were asked for."""
+        nonce, index, process, kind = HEADER.unpack(reply[: HEADER.size])
+        asked = HEADER.unpack(expected)
+        if (nonce, index, process) == asked[:3] and kind == FAILURE:
+            answer = read_message(lambda length: line.receive(length, deadline))
+            self._refuse(answer)
+        self.close()
+        if (nonce, index) == asked[:2] and process != asked[2]:
+            raise CellFailure("failed", "another process than the method's own answered for it")
+        raise CellFailure("failed", "an answer came that belongs to no sample that it was given")
+
+    def _finish(self, line: Line) -> None:
+        """See the process of the cell end, and that it has said nothing more."""
+        process = self._process
+        assert process is not None
+        deadline = time.monotonic() + ENDING
+        if process.shared:
+            process.finish_cell(ENDING)
+        try:
+            surplus = line.rest(deadline)
+        except (LateError, OSError):
+            surplus = b""
+            self.close()
+        if surplus:
+            raise CellFailure("failed", "more answers came than it was given samples")
+
+    def _answer(
+        self, line: Line, deadline: float, limit: float, content: dict[str, Any] | None = None
+    ) -> dict[str, Any]:
+        """Return the answer to a message; raise what it says has gone wrong."""
+        try:
+            if content is not None:
+                line.send(content, deadline)
+            answer = read_message(lambda length: line.receive(length, deadline))
+        except (LateError, EOFError, OSError) as error:
+            self._lost(error, limit)
+        except ValueError as error:
+            self.close()
+            raise CellFailure("failed", f"its answer cannot be read: {error}") from None
+        if answer.get("status") != "ok":
+            self._refuse(answer)
+        return answer
+
+    def _refuse(self, answer: Mapping[str, Any]) -> None:
+        """Raise what went wrong inside the process."""
+        status = answer.get("status")
         if status == "out of memory":
             self.close()  # what it holds may never be given back
             limit = self.limits.memory / 1024**2
             raise CellFailure("failed", f"out of memory (limit {limit:.0f} MiB)")
-        if status != "ok":
-            raise CellFailure(status, content)
-        return content
+        reason = printable(str(answer.get("reason", "")))
+        raise CellFailure("skipped" if status == "skipped" else "failed", reason)
 
-    def _start(self) -> None:
-        ours, theirs = Pipe()
-        environment = dict(os.environ)
-        environment["PYTHONPATH"] = os.pathsep.join(filter(None, sys.path))
-        for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-            environment.setdefault(name, "1")
-        self._process = subprocess.Popen(
-            [
-                sys.executable,
-                "-m",
-                "gripbench.bench.running.sandbox",
-                str(theirs.fileno()),
-                str(os.getpid()),
-            ],
-            pass_fds=[theirs.fileno()],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            env=environment,
-        )
-        theirs.close()
-        self._connection = ours
-        ours.send(self.limits.memory)
-        # Until it is ready it runs no code of a method: that time is nobody's.
-        with contextlib.suppress(EOFError, OSError):
-            if ours.poll(_START):
-                ours.recv()
-                return
-        reason = self._last_words()
-        self.close()
-        raise GripbenchError(f"a process for a method cannot be started: {reason}")
+    def _lost(self, error: Exception, limit: float) -> None:
+        """Raise why a process does not answer any more."""
+        process, self._process, self._loaded = self._process, None, None
+        assert process is not None
+        if isinstance(error, LateError):
+            process.end(grace=0.0)
+            raise CellFailure("timeout", f"stopped after the time limit of {limit:g} s")
+        if process.shared and process.finish_cell(ENDING):
+            code = process.cell_code
+            process.end(grace=0.0)
+        else:
+            code = process.end(grace=ENDING)
+        raise CellFailure("failed", _last_words(code))
 
-    def _last_words(self) -> str:
-        """Return how the process ended."""
-        assert self._process is not None
+
+def _loading(settings: Settings, limits: Limits) -> dict[str, Any]:
+    """Return the message that has a plug-in loaded."""
+    source = settings.source
+    folder = ""
+    if source.kind == "file":
+        folder = str(Path(source.target.rpartition(":")[0]).parent)
+    return {
+        "kind": source.kind,
+        "target": source.target,
+        "payload": base64.b64encode(source.payload).decode("ascii"),
+        "variant": settings.variant,
+        "parameters": dict(settings.parameters),
+        "memory": limits.memory,
+        "folder": folder,
+        "path": _places(source.kind, folder),
+        "seed": _digest(b"loading"),
+    }
+
+
+def _places(kind: str, folder: str) -> list[str]:
+    """Return where a plug-in's modules are looked for, after the libraries."""
+    if kind == "file":
+        return [folder]
+    import sys
+
+    return [os.path.abspath(place) for place in sys.path]
+
+
+def _generator_seed(declaration: Declaration, observations: npt.NDArray[Any]) -> str:
+    """Return the seed of the global generators in a cell's process, 32 hexadecimal digits.
+
+    It is a digest of the method's name and of the first sample that the method is given, so it
+    is the same whenever the cell runs, and tells the method nothing that the sample does not. Nine
+    digits of each value count, so that machines that differ in the last one agree.
+    """
+    first = [f"{value:.9g}" for value in observations[:1].view(np.float64).ravel()]
+    return _digest(declaration.name.encode(), *(value.encode() for value in first))
+
+
+def _digest(*parts: bytes) -> str:
+    state = hashlib.blake2b(digest_size=16, person=b"gripbench")
+    for part in parts:
+        state.update(len(part).to_bytes(8, "big"))
+        state.update(part)
+    return state.hexdigest()
+
+
+def _last_words(code: int | None) -> str:
+    if code is None:
+        return "its process closed the connection"
+    if code < 0:
         try:
-            code = self._process.wait(5.0)
-        except subprocess.TimeoutExpired:
-            return "its process closed the connection"
-        if code < 0:
-            with contextlib.suppress(ValueError):
-                return f"its process was killed by {signals.Signals(-code).name}"
+            return f"its process was killed by {signals.Signals(-code).name}"
+        except ValueError:
             return f"its process was killed by signal {-code}"
-        return f"its process exited with code {code}"
+    return f"its process exited with code {code}"
 
 
-class _Alarm:
-    """Kills a cage's process when a limit is passed, also while a pipe blocks."""
-
-    def __init__(self, cage: Cage, limit: float) -> None:
-        self.rang = False
-        self._cage = cage
-        self._timer = threading.Timer(limit + 0.5, self._ring)
-        self._timer.daemon = True
-
-    def __enter__(self) -> _Alarm:
-        self._timer.start()
-        return self
-
-    def __exit__(self, *details: object) -> None:
-        self._timer.cancel()
-
-    def _ring(self) -> None:
-        self.rang = True
-        process = self._cage._process
-        if process is not None:
-            with contextlib.suppress(OSError):
-                process.kill()
-
-
-_START = 120.0
-"""Time [s] in which an empty process has to start."""
-
-_declaring = Cage(Limits())
+_declaring = Sandbox(Limits())
 
 
 def declare(source: Source, variant: str, parameters: dict[str, Any]) -> Declaration:
@@ -240,75 +376,11 @@ def declare(source: Source, variant: str, parameters: dict[str, Any]) -> Declara
         text = str(error)
         place = source.target.rstrip(":")
         raise InputError(text if place.split(":")[0] in text else f"{place}: {text}") from None
+    finally:
+        _declaring.close()
 
 
 def end_declaring() -> None:
-    """End the process in which methods declare themselves; the next one gets a new process."""
+    """End what this process keeps to start the processes of plug-ins."""
     _declaring.close()
-
-
-def _serve(descriptor: int, parent: int) -> None:
-    """Answer requests until the parent goes away."""
-    connection = Connection(descriptor)
-    _die_with(parent)
-    _limit_memory(connection.recv())
-    connection.send("ready")
-    while True:
-        try:
-            path, request = connection.recv()
-        except (EOFError, OSError):
-            return
-        sys.path.extend(place for place in path if place not in sys.path)
-        answer = _answer(request)
-        try:
-            connection.send(answer)
-        except MemoryError:
-            connection.send(("out of memory", ""))
-        except Exception as error:  # what it answers with cannot be pickled
-            connection.send(("failed", describe_error(error)))
-
-
-def _answer(request: tuple[Any, ...]) -> tuple[str, Any]:
-    try:
-        if request[0] == "declare":
-            _, source, variant, parameters = request
-            return "ok", declaration_of(source.make(variant, parameters), variant, parameters)
-        _, source, declaration, variant, parameters, vehicle, observations, period, seed = request
-        # A method may draw from the global generators: the same numbers in any order of cells.
-        random.seed(seed)
-        np.random.seed(seed % 2**32)  # noqa: NPY002
-        method = source.make(variant, parameters)
-        outcome = execute(method, declaration, vehicle, observations, period, timed=True)
-        estimates = np.asarray(outcome.estimates)
-        return "ok", Outcome(estimates, outcome.runtime)
-    except SkippedError as error:
-        return "skipped", str(error)
-    except MemoryError:
-        return "out of memory", ""
-    except BaseException as error:  # SystemExit too: the process goes on to the next cell
-        return "failed", describe_error(error)
-
-
-def _limit_memory(memory: int) -> None:
-    try:
-        import resource
-    except ImportError:  # not on this system
-        return
-    with contextlib.suppress(OSError, ValueError):
-        with open("/proc/self/statm", encoding="ascii") as file:
-            used = int(file.read().split()[0]) * resource.getpagesize()
-        resource.setrlimit(resource.RLIMIT_AS, (used + memory, used + memory))
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-
-
-def _die_with(parent: int) -> None:
-    """Ask Linux to kill this process with its parent, however that one ends."""
-    if sys.platform == "linux":
-        with contextlib.suppress(OSError, AttributeError):
-            ctypes.CDLL(None).prctl(1, signals.SIGKILL)
-    if os.getppid() != parent:  # it ended before
-        os._exit(1)
-
-
-if __name__ == "__main__":
-    _serve(int(sys.argv[1]), int(sys.argv[2]))
+    stop_starters()

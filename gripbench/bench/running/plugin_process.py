@@ -1,0 +1,301 @@
+"""The process of a plug-in: requests and samples come in, its declaration and estimates go out.
+
+Where the system forks (Linux), `serve` is a starter that imports what every method needs and never
+runs a plug-in's code. For each plug-in it forks a process that loads it, and that one forks again
+for each cell, so that no cell finds what another one left in a class or module. Elsewhere a process
+serves one plug-in and one cell.
+
+The process of a cell has the samples that it was given and no other: the next one is sent when the
+estimates of the last one are there.
+"""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import dataclasses
+import gc
+import os
+import random
+import socket
+import struct
+import sys
+import threading
+import time
+from typing import Any, NoReturn
+
+import numpy as np
+
+from gripbench.bench.catalogue.declarations import (
+    Declaration,
+    Source,
+    declaration_of,
+    describe_error,
+)
+from gripbench.bench.running.confinement import confine, end_children, end_with
+from gripbench.bench.running.execution import (
+    Observation,
+    SkippedError,
+    VehicleOnPaper,
+    numbers_of,
+)
+from gripbench.bench.running.messages import (
+    END,
+    ESTIMATES,
+    FAILURE,
+    FINISHED,
+    message_bytes,
+    read_message,
+)
+from gripbench.envs.plants.simulation import Simulation
+from gripbench.errors import GripbenchError
+from gripbench.methods import drivers
+from gripbench.methods.contract import CompiledMethod
+
+
+class _Line:
+    """Two file descriptors, in and out; the other side's end ends this process."""
+
+    def __init__(self, read: int, write: int) -> None:
+        self.read, self.write = read, write
+
+    def receive(self, size: int) -> bytes:
+        content = os.read(self.read, size)
+        while len(content) < size:
+            more = os.read(self.read, size - len(content))
+            if not more:
+                os._exit(0)
+            content += more
+        return content
+
+    def message(self) -> dict[str, Any]:
+        return read_message(self.receive)
+
+    def send(self, content: dict[str, Any]) -> None:
+        self.put(message_bytes(content))
+
+    def put(self, content: bytes) -> None:
+        view = memoryview(content)
+        while view:
+            view = view[os.write(self.write, view) :]
+
+    def close(self) -> None:
+        for descriptor in {self.read, self.write}:
+            os.close(descriptor)
+
+
+def serve(forks: bool) -> NoReturn:
+    """Answer the run that started this interpreter, over standard input and output."""
+    read, write = os.dup(0), os.dup(0 if forks else 1)
+    nothing = os.open(os.devnull, os.O_RDWR)
+    for descriptor in (0, 1, 2):
+        os.dup2(nothing, descriptor)
+    os.close(nothing)
+    Simulation.__new__ = _refuse  # type: ignore[method-assign]
+    if forks:
+        _start_plugins(socket.socket(fileno=read))
+    line = _Line(read, write)
+    line.send({"process": os.getpid()})
+    _serve_plugin(line, forks=False)
+
+
+def _refuse(*_: Any, **__: Any) -> NoReturn:
+    raise GripbenchError("a method may not simulate: a scenario's truth is closed to it")
+
+
+def _start_plugins(control: socket.socket) -> NoReturn:
+    """Fork a process for each plug-in, and end it with all that it started."""
+    end_with(None)
+    gc.collect()
+    gc.freeze()
+    plugins: set[int] = set()
+    _Line(control.fileno(), control.fileno()).send({"process": os.getpid()})
+    while True:
+        content, descriptors, _, _ = socket.recv_fds(control, 65536, 1)
+        if not content:
+            end_children()
+            os._exit(0)
+        request = read_message(_taken(content))
+        if "start" in request:
+            process = os.fork()
+            if process == 0:
+                control.close()
+                _serve_plugin(_Line(descriptors[0], descriptors[0]), forks=True)
+            os.close(descriptors[0])
+            plugins.add(process)
+            control.sendall(message_bytes({"process": process}))
+        else:
+            process = request["end"]
+            plugins.discard(process)
+            with contextlib.suppress(OSError):
+                # Give a process that is about to end the time to do it: its code says why.
+                _wait(process, request["grace"])
+            code = end_children(keep=plugins).get(process, _codes.pop(process, None))
+            control.sendall(message_bytes({"code": code}))
+
+
+_codes: dict[int, int] = {}
+
+
+def _wait(process: int, grace: float) -> None:
+    until = time.monotonic() + grace
+    while True:
+        ended, status = os.waitpid(process, os.WNOHANG)
+        if ended:
+            _codes[process] = os.waitstatus_to_exitcode(status)
+        if ended or time.monotonic() >= until:
+            return
+        time.sleep(0.002)
+
+
+def _taken(content: bytes) -> Any:
+    """Return a function that takes the given bytes piece by piece."""
+    start = 0
+
+    def take(size: int) -> bytes:
+        nonlocal start
+        start += size
+        return content[start - size : start]
+
+    return take
+
+
+@dataclasses.dataclass(frozen=True)
+class _Plugin:
+    """A plug-in that this process has loaded."""
+
+    source: Source
+    variant: str
+    parameters: dict[str, Any]
+    declaration: Declaration
+
+    def make(self) -> Any:
+        return self.source.make(self.variant, self.parameters)
+
+
+def _serve_plugin(line: _Line, forks: bool) -> NoReturn:
+    """Load one plug-in, then serve its cells."""
+    if forks:
+        end_with(os.getppid())
+    request = line.message()
+    confine(request["memory"])
+    try:
+        plugin = _load(request)
+    except MemoryError:
+        line.send({"status": "out of memory", "reason": ""})
+    except BaseException as error:  # SystemExit too
+        line.send({"status": "failed", "reason": describe_error(error)})
+    else:
+        shared = forks and threading.active_count() == 1 and _threads() == 1
+        content = dataclasses.asdict(plugin.declaration)
+        line.send({"status": "ok", "declaration": content, "shared": shared})
+        if shared:
+            _fork_cells(line, plugin)
+        _serve_cell(line, plugin, line.message())
+    os._exit(0)
+
+
+def _threads() -> int:
+    """Return the number of threads of this process: what a fork would not take along."""
+    try:
+        return len(os.listdir("/proc/self/task"))
+    except OSError:
+        return 2
+
+
+def _load(request: dict[str, Any]) -> _Plugin:
+    _seed(request["seed"])
+    if request["folder"]:
+        os.chdir(request["folder"])
+    sys.path.extend(place for place in request["path"] if place not in sys.path)
+    payload = base64.b64decode(request["payload"])
+    source = Source(request["kind"], request["target"], payload)
+    variant, parameters = request["variant"], request["parameters"]
+    method = source.make(variant, parameters)
+    declaration = declaration_of(method, variant, parameters)
+    _compile(method)
+    return _Plugin(source, variant, parameters, declaration)
+
+
+def _compile(method: Any) -> None:
+    """Compile a step before any clock runs; no code of the plug-in is called for it."""
+    if isinstance(method, CompiledMethod) and type(method).update is CompiledMethod.update:
+        with contextlib.suppress(Exception):  # the first sample will say what is wrong
+            drivers.compile_single(method)
+
+
+def _fork_cells(line: _Line, plugin: _Plugin) -> NoReturn:
+    control = socket.socket(fileno=line.read)
+    while True:
+        content, descriptors, _, _ = socket.recv_fds(control, 1 << 20, 2)
+        if not content:
+            os._exit(0)
+        request = read_message(_taken(content))
+        parent = os.getpid()
+        process = os.fork()
+        if process == 0:
+            control.close()
+            end_with(parent)
+            _serve_cell(_Line(*descriptors), plugin, request)
+        for descriptor in descriptors:
+            os.close(descriptor)
+        _, status = os.waitpid(process, 0)
+        end_children()
+        line.send({"ended": os.waitstatus_to_exitcode(status)})
+
+
+def _serve_cell(line: _Line, plugin: _Plugin, request: dict[str, Any]) -> NoReturn:
+    """Run the method over the samples that come, one by one."""
+    try:
+        _seed(request["seed"])
+        method = plugin.make()
+        Observation.method = plugin.declaration.name
+        method.reset(VehicleOnPaper(request["vehicle"]), request["step"])
+        line.send({"status": "ok", "process": os.getpid()})
+    except BaseException as error:
+        line.send(_failure(error))
+        os._exit(0)
+    _samples(line, method, plugin.declaration)
+    os._exit(0)
+
+
+def _samples(line: _Line, method: Any, declaration: Declaration) -> None:
+    names = (*declaration.sensors, "time")
+    outputs = declaration.outputs
+    request = struct.Struct(f"=QQ{len(names)}d")
+    reply = struct.Struct(f"=QQQQQ{len(outputs)}d")
+    nothing = (0.0,) * len(outputs)
+    clock, process = time.perf_counter_ns, os.getpid
+    while True:
+        nonce, index, *sample = request.unpack(line.receive(request.size))
+        if index == END:
+            content = message_bytes({})
+            head = reply.pack(nonce, index, process(), FINISHED, len(content), *nothing)
+            line.put(head + content)
+            return
+        try:
+            obs = Observation(zip(names, sample, strict=True))
+            began = clock()
+            given = method.update(obs)
+            took = clock() - began
+            values = numbers_of(given, outputs)
+        except BaseException as error:  # SystemExit too
+            content = message_bytes(_failure(error))
+            head = reply.pack(nonce, index, process(), FAILURE, len(content), *nothing)
+            line.put(head + content)
+            return
+        os.write(line.write, reply.pack(nonce, index, process(), ESTIMATES, took, *values))
+
+
+def _failure(error: BaseException) -> dict[str, Any]:
+    if isinstance(error, MemoryError):
+        return {"status": "out of memory", "reason": ""}
+    status = "skipped" if isinstance(error, SkippedError) else "failed"
+    return {"status": status, "reason": describe_error(error)}
+
+
+def _seed(seed: str) -> None:
+    """Seed the global generators, so that a method that draws from them repeats itself."""
+    number = int(seed, 16)
+    random.seed(number)
+    np.random.seed([number >> shift & 0xFFFFFFFF for shift in (0, 32, 64, 96)])  # noqa: NPY002
