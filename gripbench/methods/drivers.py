@@ -63,7 +63,7 @@ def compile_single(method: CompiledMethod) -> None:
     types = method.record_types
     names = ("state", "obs", "params", "est")
     signature = tuple(numba.typeof(np.zeros(1, getattr(types, name))) for name in names)
-    _single(method.step).compile(signature)
+    _single(method.step).compile(signature)  # type: ignore[attr-defined]
 
 
 def batch(
