@@ -1,99 +1,65 @@
-"""Read CAN traces (.blf, .asc) through python-can, decoded by cantools with a database."""
+"""Read a CAN trace (.blf, .asc, .trc, candump's .log): its frames, decoded by databases."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 from gripbench.errors import InputError
-from gripbench.logs.channel_map import LogFile
-from gripbench.logs.readers import Content, LogColumn, optional
+from gripbench.logs import can_text
+from gripbench.logs.can_decoding import decode
+from gripbench.logs.can_text import Trace, frames_of
+from gripbench.logs.log import Content, optional
+from gripbench.logs.map_tables import LogFile
+from gripbench.logs.text_tables import parse_table, text_of
+
+LIBRARIES = ("can", "cantools")
 
 
 def read(path: Path, file: LogFile, wanted: frozenset[str] | None) -> Content:
-    """Read the signals of a CAN trace, called `Message.Signal`, each with its frames' times.
+    """Read the signals of a CAN trace, each with its frames' times; see `decode`.
 
     Raises
     ------
     InputError
         If python-can or cantools is missing, no database is named, the trace is truncated, or
-        the database knows no frame of it.
+        no database knows a frame of it.
     """
+    suffix = path.suffix.lower()
+    if suffix == ".blf":
+        return decode(path, _blf(path), file, wanted)
+    text = text_of(path)
+    if suffix == ".trc":
+        return decode(path, _trc(path, text), file, wanted)
+    if can_text.is_asc(text):
+        return decode(path, can_text.frames_of_asc(path, text), file, wanted)
+    if can_text.is_candump(text):
+        return decode(path, can_text.frames_of_candump(path, text), file, wanted)
+    return parse_table(path, text, file, wanted)  # .asc and .log are tables elsewhere
+
+
+def _blf(path: Path) -> Trace:
     can = optional("can", "a CAN trace")
-    cantools = optional("cantools", "a CAN trace")
-    if not file.database:
-        raise InputError(f"{path}: key 'database': a CAN trace needs the DBC file that decodes it")
-    database = _database(cantools, path, file.database)
-    messages = {message.frame_id: message for message in database.messages}
-    names = [f"{m.name}.{s.name}" for m in database.messages for s in m.signals]
-    selected = {
-        frame: [
-            signal.name
-            for signal in message.signals
-            if wanted is None or f"{message.name}.{signal.name}" in wanted
-        ]
-        for frame, message in messages.items()
-    }
-    samples: dict[str, tuple[list[float], list[float]]] = {}
-    odd = 0
-    for frame in _frames(can, path):
-        message = messages.get(frame.arbitration_id)
-        if message is None or frame.is_error_frame or frame.is_remote_frame:
-            continue
-        if not selected[frame.arbitration_id]:
-            continue
-        try:
-            decoded = message.decode(frame.data, decode_choices=False)
-        except (cantools.database.DecodeError, ValueError):
-            odd += 1
-            continue
-        for name in selected[frame.arbitration_id]:
-            if name in decoded:  # a multiplexed signal is not in every frame
-                times, values = samples.setdefault(f"{message.name}.{name}", ([], []))
-                times.append(frame.timestamp)
-                values.append(float(decoded[name]))
-    content = Content(names=names)
-    units = {f"{m.name}.{s.name}": s.unit or "" for m in database.messages for s in m.signals}
-    for name, (times, values) in samples.items():
-        content.columns[name] = LogColumn(
-            np.asarray(values, dtype=np.float64), np.asarray(times, dtype=np.float64), units[name]
-        )
-    if odd:
-        content.notes.append(f"{odd} frames do not fit the database and were left out")
-    if not samples and any(selected.values()):
-        raise InputError(f"{path}: the database '{file.database}' knows no frame of this trace")
-    return content
-
-
-def _database(cantools: Any, path: Path, name: str) -> Any:
-    source = Path(name) if Path(name).is_absolute() else path.parent / name
-    if not source.is_file():
-        raise InputError(f"{source}: no such file (key 'database')")
-    try:
-        return cantools.database.load_file(source, strict=False)
-    except Exception as error:
-        first = (str(error).strip().splitlines() or [type(error).__name__])[0]
-        raise InputError(f"{source}: not a CAN database ({first[:200]})") from None
-
-
-def _frames(can: Any, path: Path) -> Any:
-    if path.suffix.lower() == ".blf":
-        # Opened here, for the reader leaves a file that it refuses open.
-        with path.open("rb") as handle:
-            reader = can.BLFReader(handle)
-            if reader.file_size and reader.file_size != path.stat().st_size:
-                raise InputError(
-                    f"{path}: has {path.stat().st_size} of {reader.file_size} bytes: "
-                    "the file is truncated"
-                )
-            yield from reader
-        return
-    with path.open(encoding="utf-8", errors="replace") as handle:
-        if "end triggerblock" not in handle.read().lower()[-200:]:
+    # Opened here, for the reader leaves a file that it refuses open.
+    with path.open("rb") as handle:
+        reader = can.BLFReader(handle)
+        size = path.stat().st_size
+        if reader.file_size and reader.file_size != size:
             raise InputError(
-                f"{path}: the line 'End TriggerBlock' is missing: the file is truncated"
+                f"{path}: has {size} of {reader.file_size} bytes: the file is truncated"
             )
-    with can.ASCReader(path, relative_timestamp=True) as reader:
-        yield from reader
+        frames = list(frames_of(iter(reader)))
+    if not frames:
+        raise InputError(f"{path}: the trace has no data frame, it may be truncated or damaged")
+    return Trace(frames, [])
+
+
+def _trc(path: Path, text: str) -> Trace:
+    can = optional("can", "a CAN trace")
+    notes = []
+    if not text.endswith("\n"):
+        notes.append("the last line has no line end: the file may be cut off")
+    with can.TRCReader(path) as reader:
+        frames = list(frames_of(iter(reader)))
+    if not frames:
+        raise InputError(f"{path}: the trace has no data frame, it may be truncated or damaged")
+    return Trace(frames, notes)

@@ -8,7 +8,7 @@ import numpy as np
 
 from gripbench.envs.vehicles import GRAVITY
 from gripbench.errors import InputError
-from gripbench.logs.channel_map import Derived
+from gripbench.logs.map_tables import Derived
 from gripbench.logs.series import Floats, Series, wrapped
 
 

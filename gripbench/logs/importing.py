@@ -24,8 +24,9 @@ from gripbench.errors import InputError
 from gripbench.logs.channel_map import ChannelMap, LogFile, load_channel_map, vehicle_values
 from gripbench.logs.derivation import derive_channels, derive_reference
 from gripbench.logs.initial import zeroed
+from gripbench.logs.log import Log, LogColumn, log_of_frame
 from gripbench.logs.quality import QualityReport, judge
-from gripbench.logs.readers import Log, LogColumn, log_of_frame, read_log
+from gripbench.logs.readers import read_log
 from gripbench.logs.series import Floats, Series, series_of, wrapped
 
 _MAXIMUM_GAP = 3.0  # reference samples further apart than this many median intervals leave a hole
@@ -90,10 +91,16 @@ def import_log(log: Path, channel_map: ChannelMap | Path) -> ImportedLog:
         if chosen.files and not log.is_dir():
             raise InputError(f"{log}: is no folder; the map '{chosen.name}' has several files")
         if beside is not None and file.database:
-            database = str((beside.parent / file.database).resolve())
-            file = file.model_copy(update={"database": database})
+            databases = tuple(_beside(beside, entry) for entry in file.databases())
+            file = file.model_copy(update={"database": databases})
         logs[short] = read_log(path, file, _wanted(chosen, short, file))
     return _assemble(logs, chosen, vehicle_values(chosen, beside))
+
+
+def _beside(channel_map: Path, entry: str) -> str:
+    """Return an entry `[CHANNEL=]FILE` with the file's whole path."""
+    channel, equals, name = entry.rpartition("=")
+    return f"{channel}{equals}{(channel_map.parent / name).resolve()}"
 
 
 def import_frame(frame: pd.DataFrame, channel_map: ChannelMap | Mapping[str, Any]) -> ImportedLog:
@@ -118,10 +125,11 @@ def import_frame(frame: pd.DataFrame, channel_map: ChannelMap | Mapping[str, Any
 
 
 def _wanted(channel_map: ChannelMap, short: str, file: LogFile) -> set[str]:
-    names = {file.time.column, channel_map.runs}
+    names = {file.time.column, file.time.date, channel_map.runs}
     for column in channel_map.keyed_columns().values():
         if channel_map.file_of(column) == short:
             names |= {column.column, column.time, column.new_when, column.new_where}
+            names |= {column.negative_where, column.valid_where}
     return names - {""}
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,13 +9,13 @@ from typing import Any
 import numba
 import numpy as np
 import numpy.typing as npt
-import pandas as pd
 
 from gripbench.envs.signals import signal
 from gripbench.envs.vehicles import VEHICLE_PARAMETERS
 from gripbench.errors import InputError
-from gripbench.logs.channel_map import DATETIME, Column, TimeColumn
-from gripbench.logs.readers import Log, LogColumn
+from gripbench.logs.clock import times_of
+from gripbench.logs.log import Log
+from gripbench.logs.map_tables import Column, TimeColumn
 from gripbench.logs.units import conversion
 
 Floats = npt.NDArray[np.float64]
@@ -87,6 +86,7 @@ def series_of(
             f"{log.path}: key '{key}': {len(values)} values but {len(times)} times: "
             "name this channel's own time column"
         )
+    values = _signed_and_valid(log, key, column, values)
     finite = np.isfinite(values) & np.isfinite(times)
     infinite = int(np.isinf(values).sum())
     missing = len(values) - int(finite.sum()) - infinite
@@ -114,51 +114,24 @@ def series_of(
     )
 
 
-def times_of(log: Log, raw: LogColumn, time: TimeColumn, own: str, key: str) -> Floats:
-    """Return the times [s] of a column's rows, as the log counts them."""
-    if raw.times is not None and not own:
-        return raw.times
-    name = own or time.column
-    where = f"{key}.time" if own else "time.column"
-    stamps = log.column(name, where)
-    if time.unit == DATETIME:
-        return _seconds_of_dates(log.path, where, stamps)
-    if stamps.is_text:
-        text = str(stamps.values[~pd.isna(stamps.values)][0])
-        if _DATE.match(text):
+def _signed_and_valid(log: Log, key: str, column: Column, values: Floats) -> Floats:
+    """Return the values with the sign, and blanks, that columns beside them tell."""
+    for name, marked in (
+        ("negative_where", column.negative_where),
+        ("valid_where", column.valid_where),
+    ):
+        if not marked:
+            continue
+        marks = log.numbers(marked, f"{key}.{name}")
+        if len(marks) != len(values):
             raise InputError(
-                f"{log.path}: key '{where}': column '{name}' holds dates such as '{text[:40]}': "
-                'say unit = "datetime"'
+                f"{log.path}: key '{key}.{name}': column '{marked}' has another length"
             )
-    return log.numbers(name, where) * conversion(time.unit, "s")
-
-
-_DATE = re.compile(r"\s*\d{4}-\d{2}-\d{2}")
-_ZONE = re.compile(r"(?:[zZ]|[+-]\d{2}:?\d{2})\s*$")
-
-
-def _seconds_of_dates(path: Path, where: str, column: LogColumn) -> Floats:
-    if not column.is_text:
-        raise InputError(f"{path}: key '{where}': holds numbers, not dates; name a unit of time")
-    filled = ~pd.isna(column.values)
-    texts = [str(value) for value in column.values[filled]]
-    zones = set()
-    for text in texts:
-        found = _ZONE.search(text[10:])
-        zones.add(found.group().strip().upper() if found else "none")
-    if len(zones) > 1:
-        shown = ", ".join(sorted(zones)[:4])
-        raise InputError(f"{path}: key '{where}': the dates mix time zones ({shown}); use one")
-    try:
-        moments = pd.to_datetime(pd.Series(texts), format="ISO8601", utc=True)
-    except (ValueError, OverflowError):
-        raise InputError(
-            f"{path}: key '{where}': not all dates are ISO 8601, such as {texts[0][:40]!r}"
-        ) from None
-    seconds = np.full(len(column.values), np.nan)
-    nanoseconds = moments.astype("datetime64[ns, UTC]").astype("int64").to_numpy()
-    seconds[filled] = nanoseconds // 10**9 + (nanoseconds % 10**9) * 1e-9
-    return seconds
+        if name == "negative_where":
+            values = np.where(marks != 0.0, -values, values)
+        else:
+            values = np.where(marks != 0.0, values, np.nan)
+    return values
 
 
 def _forward(
@@ -232,7 +205,9 @@ def _convert(
 ) -> Floats:
     per_unit = VEHICLE_PARAMETERS[column.per].unit if column.per else ""
     factor = column.sign * column.scale * conversion(column.unit, signal(name).unit, per_unit)
-    if column.per:
+    if column.per == "wheel_radius" and column.per not in vehicle and column.radius > 0.0:
+        factor /= column.radius
+    elif column.per:
         if column.per not in vehicle:
             raise InputError(
                 f"{path}: key '{key}.per': the vehicle gives no '{column.per}'; "

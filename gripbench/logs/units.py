@@ -74,6 +74,11 @@ UNITS: dict[str, Unit] = {
     "rev/s": _unit(2.0 * math.pi, s=-1, rad=1),
     "rad/s^2": _unit(1.0, s=-2, rad=1),
     "deg/s^2": _unit(_DEGREE, s=-2, rad=1),
+    "Pa": _unit(1.0, kg=1, m=-1, s=-2),
+    "kPa": _unit(1e3, kg=1, m=-1, s=-2),
+    "MPa": _unit(1e6, kg=1, m=-1, s=-2),
+    "bar": _unit(1e5, kg=1, m=-1, s=-2),
+    "psi": _unit(6894.757293168, kg=1, m=-1, s=-2),
     "N": _unit(1.0, kg=1, m=1, s=-2),
     "kN": _unit(1e3, kg=1, m=1, s=-2),
     "lbf": _unit(4.4482216152605, kg=1, m=1, s=-2),
@@ -94,6 +99,11 @@ UNITS: dict[str, Unit] = {
 _SPELLINGS = {
     "": "-", "1": "-", "none": "-", "sec": "s", "seconds": "s", "µs": "us", "μs": "us",
     "mps": "m/s", "m s-1": "m/s", "kph": "km/h", "kmh": "km/h", "kmph": "km/h", "knots": "kn",
+    "m s^-1": "m/s", "m/sec": "m/s", "km/hr": "km/h", "mi/h": "mph", "kt": "kn", "kts": "kn",
+    "m s^-2": "m/s^2", "m s-2": "m/s^2", "m/sec^2": "m/s^2", "m/s**2": "m/s^2", "g's": "g",
+    "gs": "g", "gn": "g", "g0": "g", "rad s^-1": "rad/s", "rad/sec": "rad/s", "rad s-1": "rad/s",
+    "deg s^-1": "deg/s", "degree/s": "deg/s", "degrees/s": "deg/s", "degrees/second": "deg/s",
+    "grad": "deg", "grad/s": "deg/s", "º": "deg", "º/s": "deg/s", "u/min": "rpm", "1/min.": "rpm",
     "m/s2": "m/s^2", "m/s²": "m/s^2", "mps2": "m/s^2", "m/s/s": "m/s^2",
     "degree": "deg", "degrees": "deg", "°": "deg", "radians": "rad",
     "°/s": "deg/s", "deg/sec": "deg/s", "dps": "deg/s", "rps": "rad/s", "rads": "rad/s",
@@ -109,9 +119,15 @@ def proposed_unit(text: str) -> str | None:
     Used to propose a map only; a map itself must name an accepted unit exactly.
     """
     stripped = text.strip().strip("[]()").strip()
-    if stripped in UNITS:
+    if stripped in UNITS and stripped != "G":
         return stripped
-    return _SPELLINGS.get(stripped.lower())
+    if stripped == "G":  # of an accelerometer; a magnetometer's map says it itself
+        return "g"
+    lower = stripped.lower()
+    known = _SPELLINGS.get(lower)
+    if known is None:
+        known = next((unit for unit in UNITS if unit.lower() == lower), None)
+    return known
 
 
 def dimension_text(dimension: Dimension) -> str:

@@ -184,7 +184,7 @@ def test_truncated_file_is_one_error_or_the_whole_truth(tmp_path_factory, suffix
     if (folder / "car.dbc").exists():
         shutil.copy(folder / "car.dbc", cut.parent)
 
-    @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+    @settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
     @given(st.integers(min_value=0, max_value=len(content) - 1))
     def check(length):
         cut.write_bytes(content[:length])
@@ -197,7 +197,7 @@ def test_truncated_file_is_one_error_or_the_whole_truth(tmp_path_factory, suffix
         warned = any(finding.check == "file" for finding in found.report.findings)
         whole_rows = len(mine) - 1 if warned else len(mine)
         assert mine[:whole_rows].tobytes() == theirs[:whole_rows].tobytes()
-        if suffix != "csv":  # a text file cut between two lines is a shorter log
+        if suffix not in ("csv", "asc"):  # a text file cut between two lines is a shorter log
             assert len(mine) == len(theirs)
 
     refusals: list[str] = []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -33,7 +34,12 @@ def import_(
     inspect: Annotated[
         bool, typer.Option("--inspect", help="List what is in the log and propose a map.")
     ] = False,
-    database: Annotated[str, typer.Option(help="DBC file of a CAN trace, for --inspect.")] = "",
+    database: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="DBC file of CAN frames, for --inspect; repeatable; CHANNEL=FILE for one bus."
+        ),
+    ] = None,
     out: Annotated[
         Path, typer.Option(help="Folder in which the recording gets a folder of its name.")
     ] = Path("recordings"),
@@ -45,7 +51,7 @@ def import_(
     from gripbench.logs.storing import store
 
     if inspect:
-        _print_inspection(log, database)
+        _print_inspection(log, database or ())
         return
     if channel_map is None:
         raise InputError("import needs --map MAP.toml; --inspect proposes one")
@@ -239,7 +245,7 @@ def _table(scores: list[RecordedScore]) -> Table:
     )
 
 
-def _print_inspection(log: Path, database: str) -> None:
+def _print_inspection(log: Path, database: Sequence[str]) -> None:
     from rich.console import Console
     from rich.table import Table
 
@@ -257,4 +263,6 @@ def _print_inspection(log: Path, database: str) -> None:
             column.high,
         )
     Console(stderr=True).print(table)
+    for note in inspection.notes:
+        print(f"note: {note}", file=sys.stderr)
     print(inspection.proposal, end="")

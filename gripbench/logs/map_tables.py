@@ -1,0 +1,231 @@
+"""The tables of a channel map: a file, its time, a column of a log, what is known or derived."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from gripbench.configuration import Configuration
+from gripbench.envs.vehicles import VEHICLE_PARAMETERS
+from gripbench.errors import GripbenchError, unknown
+from gripbench.logs.units import conversion
+
+DATETIME = "datetime"
+"""Unit of a time column that holds ISO 8601 dates."""
+
+
+Name = Annotated[str, Field(pattern=r"^[^\x00-\x1f]*$")]
+"""Name of a column or file: on one line, for it appears in messages."""
+
+
+Databases = Name | tuple[Name, ...]
+Delimiter = Literal["", ",", ";", "\t", "|", " "]
+
+
+class TimeColumn(Configuration):
+    """Where the time of a file's rows stands.
+
+    Attributes
+    ----------
+    column
+        Name of the column; not looked at where the format carries a time with every sample.
+    date
+        Column with the date, where `column` has the time of day only; their texts are joined.
+    rate
+        Rows a second, where no column has the time; `column` is then not looked at.
+    unit
+        A unit of time, or `datetime` for dates as text: ISO 8601, or day, month and year.
+    backwards
+        What to do with a row that is earlier than one before it: refuse the log, or drop the row
+        and say so.
+    shift
+        Seconds to add, to bring the files of one recording to one clock.
+    """
+
+    column: Name = "time"
+    date: Name = ""
+    rate: float = Field(default=0.0, ge=0.0)
+    unit: str = "s"
+    backwards: Literal["refuse", "drop"] = "refuse"
+    shift: float = 0.0
+
+    @field_validator("unit")
+    @classmethod
+    def _check_unit(cls, value: str) -> str:
+        if value != DATETIME:
+            convertible(value, "s")
+        return value
+
+
+class LogFile(Configuration):
+    """One file of a recording.
+
+    Attributes
+    ----------
+    path
+        File name, looked for beside the log that is imported.
+    sha256
+        Hash of the file that this map was written for; empty: not checked.
+    time
+        Its time column.
+    database
+        DBC file that decodes a CAN log, relative to the map, or several; `CHANNEL=FILE` is for the
+        frames of one channel, counted from 0.
+    delimiter, decimal
+        How a text separates columns and writes numbers; an empty delimiter is found by itself, a
+        blank stands for any white space.
+    header
+        Number of the line that names the columns, counted from 1; 0: it is found by itself.
+    """
+
+    path: Name
+    sha256: str = Field(default="", pattern=r"^([0-9a-f]{64})?$")
+    time: TimeColumn = TimeColumn()
+    database: Databases = ""
+    delimiter: Delimiter = ""
+    decimal: Literal[".", ","] = "."
+    header: int = Field(default=0, ge=0)
+
+    def databases(self) -> tuple[str, ...]:
+        """Return the entries of `database`, none where it is empty."""
+        if isinstance(self.database, str):
+            return (self.database,) if self.database else ()
+        return self.database
+
+
+class Column(Configuration):
+    """What one column of a log is.
+
+    Attributes
+    ----------
+    column
+        Name of the column.
+    file
+        Which of the map's `files` has it; empty where there is only one.
+    unit
+        Unit of the column, see `gripbench.logs.units.UNITS`.
+    sign
+        -1 where the log counts the other way than the signal table.
+    scale, offset
+        Further factor, and a constant in the column's own unit that is subtracted.
+    per
+        Vehicle parameter by which the column is divided, such as `wheel_radius`.
+    radius
+        What the column is divided by [m] where `per` names the wheel's radius and the map no
+        vehicle that has it.
+    negative_where
+        Column that is not 0 where the value is negative, of a log that keeps magnitude and sign.
+    valid_where
+        Column that is 0 where the value means nothing.
+    rate
+        Samples a second where rows come faster than samples and hold the last one: a row is new
+        where the value changes or a sample is overdue.
+    new_when
+        Column that changes whenever this one has a new sample.
+    new_where
+        Column that is not 0 in the rows with a new sample.
+    time
+        Column with this channel's own time, on the file's clock; empty: the file's time.
+    rate_over
+        Take the column's change over the last so many seconds, per second, instead of its value;
+        `unit` is then that of the rate. 0: the value.
+    delay
+        Age [s] of the value at its time. An observation stays where it arrived, for GPS the
+        channel `gps_time` tells its age; a reference is moved back to when it was true.
+    zero
+        Take the mean over the first standstill, or the first straight stretch, for the zero.
+    """
+
+    column: Name = Field(min_length=1)
+    file: Name = ""
+    unit: str
+    sign: Literal[1, -1] = 1
+    scale: float = Field(default=1.0, gt=0.0)
+    offset: float = 0.0
+    per: str = ""
+    radius: float = Field(default=0.0, ge=0.0)
+    negative_where: Name = ""
+    valid_where: Name = ""
+    rate: float = Field(default=0.0, ge=0.0)
+    new_when: Name = ""
+    new_where: Name = ""
+    time: Name = ""
+    rate_over: float = Field(default=0.0, ge=0.0, le=60.0)
+    delay: float = Field(default=0.0, ge=0.0, le=10.0)
+    zero: Literal["", "standstill", "straight"] = ""
+
+    @field_validator("per")
+    @classmethod
+    def _check_per(cls, value: str) -> str:
+        if value and value not in VEHICLE_PARAMETERS:
+            raise ValueError(str(unknown("vehicle parameter", value, VEHICLE_PARAMETERS)))
+        return value
+
+
+class Bound(Configuration):
+    """What is known of a signal that no instrument measured: it lay within an interval.
+
+    Attributes
+    ----------
+    low, high
+        The interval, in SI units.
+    start, end
+        When it holds [s]; by default always.
+    source
+        How it is known.
+    """
+
+    low: float
+    high: float
+    start: float = 0.0
+    end: float = 1e9
+    source: str
+
+    @model_validator(mode="after")
+    def _check_order(self) -> Self:
+        if self.low > self.high or self.start >= self.end:
+            raise ValueError("low must not exceed high, and start must come before end")
+        return self
+
+
+class Derived(Configuration):
+    """What is computed from other columns, said openly because no instrument gave it.
+
+    Attributes
+    ----------
+    velocity_window
+        Width [s] of the local straight line whose slope gives the reference's velocity and yaw
+        rate from its position and yaw; 0: they are not derived.
+    acceleration_window
+        The same for its acceleration from velocity and yaw rate, and with it `mu_used`, the
+        horizontal acceleration over gravity: what the road has given, so a lower bound of what
+        it can give.
+    sideslip_above
+        Speed [m/s] from which the sideslip follows from v_y and v_x; below, it means nothing.
+    reference_ahead
+        Distance [m] of the point whose velocity the reference gives before the centre of gravity;
+        its `speed_y` is brought there with the yaw rate.
+    gps_velocity
+        Whether the channels `velocity_north` and `velocity_west` follow from `speed_gps` and
+        `course`.
+    instruments
+        Channels that a method may read although they come from the reference: motion capture in
+        the place of a speed sensor.
+    """
+
+    velocity_window: float = Field(default=0.0, ge=0.0, le=5.0)
+    acceleration_window: float = Field(default=0.0, ge=0.0, le=5.0)
+    sideslip_above: float = Field(default=1.0, gt=0.0)
+    reference_ahead: float = Field(default=0.0, ge=-10.0, le=10.0)
+    gps_velocity: bool = False
+    instruments: tuple[str, ...] = ()
+
+
+def convertible(unit: str, target: str, per: str = "", name: str = "") -> None:
+    """Refuse a unit that does not convert, in a validator's way."""
+    try:
+        conversion(unit, target, per)
+    except GripbenchError as error:
+        where = f"{name}.unit: " if name else ""
+        raise ValueError(f"{where}{error}") from None

@@ -1,0 +1,235 @@
+"""Propose a channel map: logs in, the text of a TOML file out, with every guess marked as one."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gripbench.envs.signals import SIGNALS
+from gripbench.logs.log import Log, LogColumn
+from gripbench.logs.naming import REFERENCE_ALWAYS, Guess, guesses, written_unit
+from gripbench.logs.time_columns import TimeTable, time_table
+from gripbench.logs.units import UNITS, proposed_unit
+
+_SPEEDS = ("speed_x", "speed_gps")
+_STEERING_RATIO = 16.0
+_WIDEST_ROAD_ANGLE = 0.9  # rad; wheels turn no further
+_RADIUS = 0.3  # m
+_SIGN_NAMES = re.compile(r"(sign|vz|vorzeichen|dir(ection)?)$", re.I)
+_VALID_NAMES = re.compile(r"(valid|ok|qf|validity)$", re.I)
+
+
+@dataclass
+class Entry:
+    """One mapped column: its keys, and what was taken for granted."""
+
+    keys: dict[str, Any]
+    reasons: list[str] = field(default_factory=list)
+
+
+@dataclass
+class Draft:
+    """A map being proposed; `tables` has the columns by key, such as `channels.yaw_rate`."""
+
+    top: dict[str, Any]
+    times: dict[str, TimeTable]
+    files: dict[str, dict[str, Any]]
+    tables: dict[str, Entry]
+    instruments: list[str] = field(default_factory=list)
+    unknown: list[str] = field(default_factory=list)
+    axes: str = ""
+
+    def content(self) -> dict[str, Any]:
+        """Return the map as a dictionary."""
+        whole: dict[str, Any] = dict(self.top)
+        for short, table in self.times.items():
+            if short:
+                whole.setdefault("files", {})[short] = {**self.files[short], "time": table.keys}
+            elif table.keys:
+                whole["time"] = table.keys
+        for key, entry in self.tables.items():
+            table_name, _, name = key.partition(".")
+            whole.setdefault(table_name, {})[name] = entry.keys
+        if self.instruments:
+            whole["derived"] = {"instruments": self.instruments}
+        return whole
+
+
+def propose(path: Path, logs: dict[str, Log], databases: tuple[str, ...] = ()) -> str:
+    """Return a map for logs by short name; one that is alone has the empty name."""
+    return text_of(draft(path, logs, databases))
+
+
+def draft(path: Path, logs: dict[str, Log], databases: tuple[str, ...]) -> Draft:
+    """Return the map that the columns' names, units and numbers suggest."""
+    name = re.sub(r"\W+", "_", path.stem.lower()).strip("_")
+    top: dict[str, Any] = {
+        "name": name if re.match(r"[a-z]", name) and name.isascii() else "log_" + re.sub(
+            r"[^a-z0-9_]+", "_", name
+        ),
+        "description": "",
+        "licence": "",
+    }  # fmt: skip
+    files: dict[str, dict[str, Any]] = {}
+    for short, log in logs.items():
+        about: dict[str, Any] = {"sha256": log.sha256}
+        if databases:
+            about["database"] = databases[0] if len(databases) == 1 else list(databases)
+        if "decimal" in log.suggestions:
+            about["decimal"] = ","
+        if short:
+            files[short] = {"path": log.path.name, **about}
+        else:
+            top |= about
+    made = Draft(top, {short: time_table(log) for short, log in logs.items()}, files, {})
+    for short, log in logs.items():
+        _add_columns(made, short, log)
+    _settle_speed(made)
+    return made
+
+
+def text_of(made: Draft) -> str:
+    """Return the TOML text of a draft."""
+    lines = [
+        "# Proposed from the names, units and numbers of the columns. Look at every line that is",
+        "# marked GUESS; the rest is what the log itself says.",
+    ]
+    lines += [f"{key} = {_toml(value)}" for key, value in made.top.items()]
+    for short, table in made.times.items():
+        if short:
+            lines += ["", f"[files.{short}]"]
+            lines += [f"{key} = {_toml(value)}" for key, value in made.files[short].items()]
+        if table.keys or table.reasons:
+            lines += ["", f"[files.{short}.time]" if short else "[time]"]
+        lines += [f"# GUESS: {reason}" for reason in table.reasons]
+        lines += [f"{key} = {_toml(value)}" for key, value in table.keys.items()]
+    for key, entry in made.tables.items():
+        lines += ["", f"[{key}]"]
+        lines += [f"# GUESS: {reason}" for reason in entry.reasons]
+        lines += [f"{name} = {_toml(value)}" for name, value in entry.keys.items()]
+    if made.instruments:
+        lines += ["", "[derived]", "# GUESS: the reference's speed serves as a sensor, too"]
+        lines.append(f"instruments = {_toml(made.instruments)}")
+    if made.unknown:
+        lines += ["", "# Columns that no signal was found for:"]
+        lines += [f"#   {_toml(name)}" for name in made.unknown]
+    return "\n".join(lines) + "\n"
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(_toml(one) for one in value) + "]"
+    return repr(value)
+
+
+def _add_columns(made: Draft, short: str, log: Log) -> None:
+    time = made.times[short].keys
+    of_time = {time.get("column"), time.get("date")}
+    found = guesses(name for name in log.columns if name not in of_time)
+    rivals: dict[str, list[str]] = {}
+    for name, column in log.columns.items():
+        if name in of_time:
+            continue
+        guess = found.get(name)
+        if guess is None or column.is_text or not np.isfinite(column.values).any():
+            made.unknown.append(f"{short}: {name}" if short else name)
+            continue
+        table = "reference" if guess.reference or guess.signal in REFERENCE_ALWAYS else "channels"
+        key = f"{table}.{guess.signal}"
+        if key in made.tables:
+            rivals.setdefault(key, []).append(name)
+            continue
+        entry = _entry(name, column, guess, log)
+        if entry is None:
+            made.unknown.append(f"{short}: {name}" if short else name)
+            continue
+        if short:
+            entry.keys = {"column": name, "file": short, **entry.keys}
+        made.tables[key] = entry
+    for key, names in rivals.items():
+        made.tables[key].reasons.append(f"taken before {', '.join(names[:5])}")
+
+
+def _entry(name: str, column: LogColumn, guess: Guess, log: Log) -> Entry | None:
+    """Return the table of a column, or None where its unit measures something else."""
+    unit, told = _unit(name, column, guess)
+    if unit is None:
+        return None
+    keys: dict[str, Any] = {"column": name, "unit": unit}
+    reasons = [guess.reason] if guess.reason else []
+    if not told:
+        reasons.append(f"no unit is written: {unit} is taken")
+    if guess.sign < 0:
+        keys["sign"] = -1
+    if guess.offset:
+        keys["offset"] = guess.offset
+    if UNITS[unit].dimension != UNITS[SIGNALS[guess.signal].unit].dimension:
+        keys["per"] = "wheel_radius"
+        keys["radius"] = _RADIUS
+        reasons.append(f"where the map names no vehicle, the wheels' radius is {_RADIUS:g} m")
+    if guess.signal == "steer_angle":
+        _steering(name, column, keys, reasons, log)
+    return Entry(keys, reasons)
+
+
+def _unit(name: str, column: LogColumn, guess: Guess) -> tuple[str | None, bool]:
+    """Return a column's unit, None where it is of another kind, and whether the log tells it."""
+    target = SIGNALS[guess.signal].unit
+    wanted = [UNITS[target].dimension]
+    if guess.signal.startswith("wheel_speed"):
+        wanted.append(UNITS["m/s"].dimension)  # a wheel's speed at its circumference
+    written = proposed_unit(column.unit) if column.unit else None
+    for unit in (written, written_unit(name)):
+        if unit is not None and UNITS[unit].dimension in wanted:
+            return unit, True
+    if written is not None and written != "-":
+        return None, True
+    if guess.unit:
+        return guess.unit, True
+    return target, False
+
+
+def _steering(
+    name: str, column: LogColumn, keys: dict[str, Any], reasons: list[str], log: Log
+) -> None:
+    """Add the ratio of a steering wheel, and what else its sensor puts beside the angle."""
+    stem = re.sub(r"[^.:/]*$", "", name)
+    for other in log.columns:
+        if other == name or not other.startswith(stem):
+            continue
+        if "steer" not in other.lower() and not stem:
+            continue
+        if _SIGN_NAMES.search(other) and np.all(column.values[np.isfinite(column.values)] >= 0.0):
+            keys["negative_where"] = other
+        elif _VALID_NAMES.search(other) and len(log.columns[other].values) == len(column.values):
+            keys["valid_where"] = other
+    filled = column.values[np.isfinite(column.values)]
+    widest = float(np.max(np.abs(filled))) * UNITS[keys["unit"]].factor
+    wheel = re.search(r"wheel|sw\b|_sw|swa|lws|lenk|steered|esp|lwi|hand", name, re.I)
+    if widest > _WIDEST_ROAD_ANGLE or (wheel and widest > 0.1):
+        keys["scale"] = 1.0 / _STEERING_RATIO
+        reasons.append(
+            f"a steering wheel's angle; {_STEERING_RATIO:g} is a usual steering ratio, put your "
+            "car's own"
+        )
+
+
+def _settle_speed(made: Draft) -> None:
+    """Leave a forward speed beside its lateral one, and see that some channel has a speed."""
+    if "channels.speed_x" in made.tables and "reference.speed_y" in made.tables:
+        entry = made.tables.pop("channels.speed_x")
+        made.tables.setdefault("reference.speed_x", entry)
+    if not any(key.startswith("channels.") for key in made.tables):
+        made.tables = {
+            "channels." + key.partition(".")[2]: entry for key, entry in made.tables.items()
+        }
+    channels = {key.partition(".")[2] for key in made.tables if key.startswith("channels.")}
+    if not channels & set(_SPEEDS) and "reference.speed_x" in made.tables:
+        made.instruments.append("speed_x")
