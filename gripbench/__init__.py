@@ -41,7 +41,9 @@ if TYPE_CHECKING:
 
 # numba's cache must see edits of what a function calls, see gripbench.compilation
 _LOCATORS = (
-    "gripbench.compilation.BesideSource,gripbench.compilation.InUserFolder,"
+    "gripbench.compilation.InGivenFolder,gripbench.compilation.BesideSource,"
+    "gripbench.compilation.InUserFolder,"
+    "gripbench.compilation.InTemporaryFolder,"
     "UserProvidedCacheLocator,InTreeCacheLocator,UserWideCacheLocator,IPythonCacheLocator"
 )
 os.environ.setdefault("NUMBA_CACHE_LOCATOR_CLASSES", _LOCATORS)

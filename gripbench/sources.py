@@ -12,12 +12,44 @@ import hashlib
 import importlib.metadata
 import sys
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 import gripbench
 
-_PROJECT = Path(gripbench.__file__).parent
+_PROJECT = Path(gripbench.__file__).resolve().parent
+
+
+@dataclass(frozen=True)
+class _File:
+    changed: int
+    size: int
+    digest: str
+
+
+def _file(path: Path) -> _File:
+    about = path.stat()
+    content = hashlib.sha256(path.read_bytes()).hexdigest()
+    return _File(about.st_mtime_ns, about.st_size, content)
+
+
+_AT_START = {path: _file(path) for path in _PROJECT.rglob("*.py")}
+"""The files of gripbench when this process began: what it runs is what they held then."""
+
+
+def changed_since_start() -> Path | None:
+    """Return a file of gripbench that is not what this process runs; None: all are."""
+    for path, before in _AT_START.items():
+        try:
+            about = path.stat()
+            if (about.st_mtime_ns, about.st_size) == (before.changed, before.size):
+                continue
+            if _file(path).digest != before.digest:
+                return path
+        except OSError:
+            return path
+    return None
 
 
 def digest(*parts: str) -> str:
@@ -45,9 +77,8 @@ def source_digest(*files: Path) -> str:
         path = waiting.pop()
         if path in paths:
             continue
-        content = path.read_bytes()
-        paths[path] = hashlib.sha256(content).hexdigest()
-        own, foreign = _imports(path, hashlib.sha256(content).hexdigest())
+        paths[path] = _AT_START[path].digest if path in _AT_START else _file(path).digest
+        own, foreign = _imports(path, paths[path])
         waiting.extend(own)
         packages |= foreign
     lines = [f"{_relative(path)} {content}" for path, content in paths.items()]
@@ -180,9 +211,14 @@ def _version(package: str) -> str:
         return ""
 
 
+def in_project(path: Path) -> bool:
+    """Return whether a file belongs to gripbench."""
+    return path.resolve().is_relative_to(_PROJECT)
+
+
 @cache
 def imports_gripbench(path: Path) -> bool:
     """Return whether a file belongs to gripbench or imports anything of it."""
-    if path.resolve().is_relative_to(_PROJECT):
+    if in_project(path):
         return True
     return any(name.split(".")[0] == "gripbench" for name in _imported_names(path))

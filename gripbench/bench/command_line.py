@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import gc
 import importlib
+import os
 import pkgutil
+import signal
 import sys
 from typing import NoReturn
 
@@ -35,8 +37,14 @@ def main() -> None:
         code = application()(standalone_mode=False)
     except GripbenchError as error:
         _stop(str(error), 2)
-    except (KeyboardInterrupt, typer.Abort):
-        _stop("interrupted; what had finished is kept", 130)
+    except (KeyboardInterrupt, typer.Abort) as error:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # one is enough: what follows is short
+        said = str(error.__cause__ or error)
+        _stop(said or "interrupted; what had finished is kept: run the same command again", 130)
+    except BrokenPipeError:
+        # whoever read the output has gone: no words can reach anybody
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        sys.exit(1)
     except Exception as error:
         # wrong usage; typer's own class for it has moved between its versions
         usage = getattr(error, "format_message", None)

@@ -249,17 +249,18 @@ def choose_method(
         variant=variant,
         parameters=settings,
         isolated=isolated,
-        digest=_method_digest(source, declaration),
+        digest=method_digest(source, declaration),
     )
 
 
-def _method_digest(source: Source, declaration: Declaration) -> str:
+def method_digest(source: Source, declaration: Declaration) -> str:
+    """Return the digest of a method's source and settings, from what is in its files now."""
+    files = [Path(declaration.file)] if declaration.file else []
+    if source.kind == "file":
+        files.append(Path(source.target.rpartition(":")[0]))  # it may make the class of another
+    code = source_digest(*(path for path in files if path.is_file()))
     if source.kind == "value":
-        code = digest(repr(source.payload))
-        if declaration.file and Path(declaration.file).is_file():
-            code = digest(code, source_digest(Path(declaration.file)))
-    else:
-        code = source_digest(Path(declaration.file))
+        code = digest(code, repr(source.payload))
     settings = sorted(declaration.settings.items())
     return digest(code, source.target.rpartition(":")[2], declaration.variant, repr(settings))
 

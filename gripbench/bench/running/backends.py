@@ -7,15 +7,16 @@ one function in `ENGINES`.
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import os
+import signal
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass
 from typing import Any
-
-import joblib
 
 from gripbench.errors import GripbenchError, InputError, unknown
 
@@ -65,24 +66,58 @@ class Backend:
 
 
 def _loky(backend: Backend, work: Work, chunks: Iterable[Any]) -> Iterator[Any]:
-    from joblib.externals.loky.process_executor import TerminatedWorkerError
+    from joblib.externals.loky.process_executor import BrokenProcessPool, ProcessPoolExecutor
 
     if backend.processes == 1:
         yield from map(work, chunks)
         return
-    parallel = joblib.Parallel(
-        n_jobs=backend.processes,
-        backend="loky",
-        return_as="generator_unordered",
-        batch_size=1,
-        pre_dispatch=3 * backend.processes,
-        max_nbytes=None,
-    )
+    # Processes of this run alone: whatever they imported ends with it.
+    executor = ProcessPoolExecutor(backend.processes, env=_ONE_THREAD)
     parent = os.getpid()
+
+    def submit(number: int) -> set[Future[Any]]:
+        with _interrupts_held():  # processes that start now never see the user's interrupt
+            return {
+                executor.submit(_in_worker, work, chunk, parent)
+                for chunk in itertools.islice(pending, number)
+            }
+
+    pending = iter(chunks)
     try:
-        yield from parallel(joblib.delayed(_in_worker)(work, chunk, parent) for chunk in chunks)
-    except TerminatedWorkerError as error:
+        under_way = submit(3 * backend.processes)
+        while under_way:
+            done, under_way = wait(under_way, return_when=FIRST_COMPLETED)
+            under_way |= submit(len(done))
+            for future in sorted(done, key=lambda one: one.exception() is not None):
+                yield future.result()  # what came back first, then what was lost
+    except BrokenProcessPool as error:
         raise WorkerLostError(f"a worker process died: {str(error).splitlines()[0]}") from None
+    finally:
+        with _interrupts_held():
+            executor.shutdown(wait=True, kill_workers=True)
+
+
+_ONE_THREAD = {
+    name: os.environ.get(name, "1")
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+}
+
+
+@contextlib.contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Hold the user's interrupt back until the end of the block; what starts in it never gets one.
+
+    A terminal sends it to all processes. This one ends the others, in order and without their
+    tracebacks.
+    """
+    if not hasattr(signal, "pthread_sigmask"):  # not on this system
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 _watched: set[int] = set()
@@ -108,12 +143,13 @@ def _dask(backend: Backend, work: Work, chunks: Iterable[Any]) -> Iterator[Any]:
     except ImportError:
         raise InputError("--backend dask needs: pip install 'gripbench[dask]'") from None
     try:
-        if backend.scheduler:
-            client = distributed.Client(backend.scheduler, timeout=10.0)
-        else:
-            client = distributed.Client(
-                n_workers=backend.processes, threads_per_worker=1, dashboard_address=None
-            )
+        with _interrupts_held():
+            if backend.scheduler:
+                client = distributed.Client(backend.scheduler, timeout=10.0)
+            else:
+                client = distributed.Client(
+                    n_workers=backend.processes, threads_per_worker=1, dashboard_address=None
+                )
     except (OSError, TimeoutError, ValueError) as error:
         raise InputError(f"Dask scheduler '{backend.scheduler}': {error}") from None
     with client:

@@ -7,13 +7,16 @@ what a worker process does, wherever it is; rows go back to the process that ask
 from __future__ import annotations
 
 import atexit
-from dataclasses import dataclass
+import os
+import platform
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from gripbench.bench.catalogue.declarations import Source, describe_error
-from gripbench.bench.catalogue.registry import MethodSpec
+from gripbench.bench.catalogue.registry import MethodSpec, method_digest
+from gripbench.bench.running.deadline import DeadlineError, deadline
 from gripbench.bench.running.execution import Outcome, SkippedError, execute, missing
-from gripbench.bench.running.fingerprints import versions
+from gripbench.bench.running.fingerprints import versions, world_digest
 from gripbench.bench.running.processes import stop_starters
 from gripbench.bench.running.recorded_scenarios import RecordedScenario, judged, recording_of
 from gripbench.bench.running.rows import Row, Status
@@ -22,6 +25,7 @@ from gripbench.bench.running.store import row_path
 from gripbench.bench.scoring.scoring import DivergedError, score, targets_of
 from gripbench.envs.recordings import Recording
 from gripbench.envs.scenarios import Scenario
+from gripbench.errors import GripbenchError
 from gripbench.sources import digest
 
 
@@ -64,6 +68,10 @@ def cell_of(scenario: Scenario, seed: int, method: MethodSpec, world: str) -> Ce
     return Cell(scenario, seed, method, world, key)
 
 
+class OtherCodeError(GripbenchError):
+    """A worker runs other code than the one that the keys of its cells stand for."""
+
+
 @dataclass(frozen=True)
 class Task:
     """Cells of one recording.
@@ -89,18 +97,57 @@ def run_tasks(tasks: tuple[Task, ...]) -> list[Row]:
 
 
 def run_task(task: Task) -> list[Row]:
-    """Simulate a scenario once and run every method of the task over the recording."""
+    """Simulate a scenario once and run every method of the task over the recording.
+
+    Raises
+    ------
+    OtherCodeError
+        If this process runs other code than the one that made the plan.
+    """
+    for cell in task.cells:
+        _check_code(cell)
     scenario, seed = task.cells[0].scenario, task.cells[0].seed
     if isinstance(scenario, RecordedScenario) and scenario.absent:
         return [_row(cell, (), "skipped", scenario.absent) for cell in task.cells]
     try:
-        recording = recording_of(scenario, seed)
+        with deadline(task.limits.time):
+            recording = recording_of(scenario, seed)
+    except DeadlineError:
+        reason = f"the simulation was stopped after the time limit of {task.limits.time:g} s"
+        limit = {"time_limit": task.limits.time}
+        return [
+            _row(cell, cell.method.declaration.estimates, "timeout", reason).model_copy(
+                update=limit
+            )
+            for cell in task.cells
+        ]
     except Exception as error:
         reason = f"the scenario could not be simulated: {describe_error(error)}"
         return [
             _row(cell, cell.method.declaration.estimates, "failed", reason) for cell in task.cells
         ]
     return [run_cell(cell, recording, task.limits, task.timed) for cell in task.cells]
+
+
+_checked: set[tuple[str, str]] = set()
+
+
+def _check_code(cell: Cell) -> None:
+    """Check that this process, wherever it is, has the code that the key of a cell stands for."""
+    method = cell.method
+    shared = (cell.world, "" if method.isolated else method.digest)
+    if shared in _checked:
+        return
+    here = method.digest if method.isolated else method_digest(method.source, method.declaration)
+    world = world_digest(cell.scenario)
+    found = cell_of(cell.scenario, cell.seed, replace(method, digest=here), world)
+    if found.key != cell.key:
+        raise OtherCodeError(
+            f"a worker ({platform.node()}, process {os.getpid()}) has another gripbench or other "
+            "packages than the process that asks it: a file was edited meanwhile, or the cluster "
+            "has to be started again; then run the same command again"
+        )
+    _checked.add(shared)
 
 
 def run_cell(cell: Cell, recording: Recording, limits: Limits, timed: bool) -> Row:

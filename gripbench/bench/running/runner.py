@@ -14,6 +14,8 @@ from dataclasses import dataclass, field
 from itertools import groupby, islice
 from typing import Any
 
+import numba
+
 from gripbench.bench.catalogue.registry import MethodSpec
 from gripbench.bench.running.backends import Backend, WorkerLostError
 from gripbench.bench.running.cells import Cell, Task, cell_of, close_sandboxes, run_tasks
@@ -24,6 +26,7 @@ from gripbench.bench.running.sandbox import Limits, end_declaring
 from gripbench.bench.running.store import DamagedRowError, Store
 from gripbench.envs.scenarios import Scenario
 from gripbench.errors import InputError
+from gripbench.sources import changed_since_start
 
 CHUNK = 4
 """Seeds in a chunk of work, where no method runs isolated."""
@@ -64,6 +67,10 @@ class Plan:
             for seed in self.seeds_of(scenario):
                 for method in methods:
                     yield cell_of(scenario, seed, method, world)
+
+
+class InterruptedRun(KeyboardInterrupt):
+    """A run that its user interrupted; says what is kept."""
 
 
 @dataclass
@@ -120,6 +127,7 @@ def run_plan(
     """
     backend, limits = backend or Backend(), limits or Limits()
     _check_labels(plan)
+    _check_process()
     began = time.perf_counter()
     report = Report()
     waiting = []
@@ -156,6 +164,12 @@ def run_plan(
                     for cell in waiting
                     if (cell.scenario.name, cell.method.label, cell.seed) not in done
                 ]
+    except KeyboardInterrupt:
+        kept = report.stored + report.computed
+        raise InterruptedRun(
+            f"interrupted; {kept} of {plan.size} rows are kept in {store.results}: the same "
+            "command goes on from there"
+        ) from None
     finally:
         close_sandboxes()
         end_declaring()
@@ -197,6 +211,21 @@ def _chunks(
     size = 1 if isolated or backend.processes == 1 else CHUNK
     while chunk := tuple(islice(tasks, size)):
         yield chunk
+
+
+def _check_process() -> None:
+    """Check that what this process would run is what keys would say that it ran."""
+    changed = changed_since_start()
+    if changed is not None:
+        raise InputError(
+            f"{changed}: changed after this Python had loaded it; start Python again, so that the "
+            "code that runs is the one in the file"
+        )
+    if numba.config.DISABLE_JIT:
+        raise InputError(
+            "the environment variable NUMBA_DISABLE_JIT is set: methods and simulations are "
+            "compiled and cannot run without; unset it"
+        )
 
 
 def _check_labels(plan: Plan) -> None:

@@ -37,6 +37,9 @@ INTEGRATORS = {"ros3": ROS3, "rk4": RK4}
 TOLERANCE = 3e-7
 """Largest local error of `ros3`, relative to 1 m/s + the speed (rolling speed for an axle)."""
 
+_MOST_TRIES = 100_000
+"""Steps in one sample at most; a usual one takes one or two."""
+
 _RK4_STEPS = 10
 
 _GAMMA = 0.43586652150845899941601945119356
@@ -81,7 +84,7 @@ def ros3(x, step, duration, inputs, plant, tyres):  # type: ignore[no-untyped-de
     rate_v, rate_f, rate_r = rates(v, f, r, force_front, force_rear, gravity, inputs, plant)
     j00, j01, j02, j10, j11, j20, j22 = jacobian(v, f, r, inputs, plant, tyres)
     done = 0.0
-    while True:
+    for _ in range(_MOST_TRIES):
         h = min(step, duration - done)
         last = h >= (duration - done) * (1.0 - 1e-9)
         shift, per_step = 1.0 / (_GAMMA * h), 1.0 / h
@@ -123,6 +126,8 @@ def ros3(x, step, duration, inputs, plant, tyres):  # type: ignore[no-untyped-de
             rate_v, rate_f, rate_r = rates(v, f, r, force_front, force_rear, gravity, inputs, plant)
             j00, j01, j02, j10, j11, j20, j22 = jacobian(v, f, r, inputs, plant, tyres)
         step = h * growth
+    x[:] = np.nan  # as above: no step is small enough
+    return duration
 
 
 @compiled

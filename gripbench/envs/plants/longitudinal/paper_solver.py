@@ -16,6 +16,7 @@ profile's breakpoints, on a friction step and on every 0.1 s. Every accepted ste
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from gripbench.envs.drivers.profiles import profile_value
 from gripbench.envs.plants.longitudinal.plant import compiled, derivatives
@@ -24,6 +25,15 @@ TOLERANCE = 1e-3
 FIRST_STEP = 1e-3
 LARGEST_STEP = 0.6
 STOP_EVERY = 0.1
+
+MOST_TRIES = 100_000
+"""Refused steps after which the solver returns to its caller, who may stop the run."""
+
+CARRY_TYPE = np.dtype(
+    [("time", "f8"), ("step", "f8"), ("stop", "i8"), ("failed", "?"), ("largest", "f8", (3,))]
+)
+"""What a run goes on with: time and size [s] of its next step, number of stops that are reached,
+whether that step has been refused already, and the largest values of the state so far."""
 
 # Dormand, J. R., Prince, P. J.: A family of embedded Runge-Kutta formulae, J. Comput. Appl. Math.
 # 6 (1980). Rows: stages 2 to 7; the last row is also the fifth-order solution.
@@ -55,14 +65,27 @@ def set_inputs(inputs, time, front, rear, friction, grade):  # type: ignore[no-u
     inputs.road_grade = grade
 
 
+def fresh(x0: npt.NDArray[np.float64]) -> npt.NDArray[np.void]:
+    """Return the record with which a run begins at a state of shape (3,)."""
+    carry = np.zeros(1, CARRY_TYPE)
+    carry["step"] = FIRST_STEP
+    carry["largest"] = np.abs(x0)
+    return carry
+
+
 @compiled
-def paper_solver(x0, stops, inputs, plant, front, rear, friction, grade, times, states):  # type: ignore[no-untyped-def]
-    """Integrate to the last stop; write every accepted step.
+def paper_solver(x, carry, stops, inputs, plant, front, rear, friction, grade, times, states):  # type: ignore[no-untyped-def]
+    """Integrate towards the last stop; write every accepted step.
+
+    It returns when the outputs are full or after `MOST_TRIES` tries of a step, and goes on there
+    when it is called again: a caller can stop a run that would take hours.
 
     Parameters
     ----------
-    x0
-        Initial state, shape (3,).
+    x
+        State, shape (3,): the initial one, then that of the last accepted step.
+    carry
+        What it goes on with, one record of `CARRY_TYPE` in an array; `fresh` makes the first.
     stops
         Times [s] at which a step must end, ascending; the last is the horizon.
     inputs, plant
@@ -76,17 +99,15 @@ def paper_solver(x0, stops, inputs, plant, front, rear, friction, grade, times, 
 
     Returns
     -------
-    Number of samples written, or -1 if the capacity does not suffice.
+    Number of samples written; `carry.stop` is the number of stops that are reached.
     """
-    n = x0.shape[0]
+    n = x.shape[0]
     k = np.zeros((7, n))
-    x, stage, new, largest = x0.copy(), np.zeros(n), np.zeros(n), np.abs(x0)
-    time, h = 0.0, FIRST_STEP
-    times[0] = time
-    states[0] = x
-    count, stop = 1, 0
-    while stop < stops.shape[0]:
-        failed = False
+    going = carry[0]
+    stage, new, largest = np.zeros(n), np.zeros(n), going.largest
+    time, h, stop, failed = going.time, going.step, going.stop, going.failed
+    count, tries = 0, 0
+    while stop < stops.shape[0] and count < times.shape[0]:
         # an interval never straddles a jump: within it the inputs are those of its inside
         while True:
             step = min(h, LARGEST_STEP)
@@ -112,6 +133,10 @@ def paper_solver(x0, stops, inputs, plant, front, rear, friction, grade, times, 
                 error = max(error, abs(step * difference) / scale)
             if error <= TOLERANCE:
                 break
+            tries += 1
+            if tries > MOST_TRIES:
+                going.time, going.step, going.stop, going.failed = time, h, stop, failed
+                return count
             shrink = 0.5 if failed else max(0.1, 0.8 * (TOLERANCE / error) ** 0.2)
             h = step * shrink
             failed = True
@@ -126,9 +151,9 @@ def paper_solver(x0, stops, inputs, plant, front, rear, friction, grade, times, 
         for i in range(n):
             x[i] = new[i]
             largest[i] = max(largest[i], abs(x[i]))
-        if count >= times.shape[0]:
-            return -1
+        failed = False
         times[count] = time
         states[count] = x
         count += 1
+    going.time, going.step, going.stop, going.failed = time, h, stop, failed
     return count

@@ -20,7 +20,12 @@ from gripbench.envs.drivers.profiles import (
     segment_records,
 )
 from gripbench.envs.plants.longitudinal import integrators
-from gripbench.envs.plants.longitudinal.paper_solver import STOP_EVERY, paper_solver, set_inputs
+from gripbench.envs.plants.longitudinal.paper_solver import (
+    STOP_EVERY,
+    fresh,
+    paper_solver,
+    set_inputs,
+)
 from gripbench.envs.plants.longitudinal.plant import (
     INPUT_TYPE,
     TYRE_TYPE,
@@ -38,6 +43,12 @@ from gripbench.envs.vehicles import Vehicle
 from gripbench.errors import GripbenchError
 
 PAPER_SOLVER = "paper"
+
+_AT_ONCE = 20_000
+"""Steps of the paper's solver after which the run can be stopped."""
+
+_MOST_STEPS = 1_000_000
+"""Steps of the paper's solver at most: a drive of the paper takes up to 28 000."""
 
 _FULL_TORQUE = 5000.0
 _FIRST_STEP = 1e-5  # of the integrator [s]; it then chooses its own
@@ -364,20 +375,28 @@ class LongitudinalSimulation(Simulation):
         stops = {round(i * STOP_EVERY, 9) for i in range(1, int(scenario.horizon / STOP_EVERY) + 1)}
         stops |= set().union(*(breakpoints(part) for part in self._segments), {scenario.horizon})
         ordered = np.array(sorted(t for t in stops if 0.0 < t <= scenario.horizon))
-        capacity = 100_000
-        while True:
-            times, states = np.empty(capacity), np.empty((capacity, 3))
-            count = paper_solver(
-                self._x, ordered, self._inputs, self._plant, *self._profiles,
-                scenario.road_grade, times, states,
+        carry = fresh(self._x)
+        times, states = [np.zeros(1)], [self._x[None].copy()]
+        count = 1
+        while carry["stop"][0] < len(ordered):
+            some, reached = np.empty(_AT_ONCE), np.empty((_AT_ONCE, 3))
+            written = paper_solver(
+                self._x, carry, ordered, self._inputs, self._plant, *self._profiles,
+                scenario.road_grade, some, reached,
             )  # fmt: skip
-            if count >= 0:
-                break
-            capacity *= 2
+            times.append(some[:written])
+            states.append(reached[:written])
+            count += written
+            if count > _MOST_STEPS or not written:
+                raise GripbenchError(
+                    f"{scenario.name}: the paper's solver came to {carry['time'][0]:.3g} of "
+                    f"{scenario.horizon:g} s in {count} steps: this vehicle is too stiff for an "
+                    "explicit method; choose the integrator 'ros3'"
+                )
         truth = np.zeros(count, TRUTH_TYPE)
         _sampled_truth(
-            times[:count],
-            states[:count],
+            np.concatenate(times),
+            np.concatenate(states),
             self._inputs,
             self._plant,
             self._profiles,
