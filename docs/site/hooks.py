@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import posixpath
 import re
+import sys
 from html import unescape
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,8 @@ from gripbench.bench.publishing.equation_pages import equations_page
 from gripbench.bench.publishing.method_pages import catalogue_page
 
 ROOT = Path(__file__).parents[2]
+sys.path.append(str(Path(__file__).parent))
+from printed import refreshed  # noqa: E402 - a module of this folder, which is no package
 _LINK = re.compile(r"(?<!!)\[([^\]]*)\]\((\.\./[^)\s]+)\)")
 _FORMULA = re.compile(r'<(span|div) class="arithmatex">\\([(\[])(.*?)\\[)\]]</\1>', re.DOTALL)
 
@@ -28,7 +31,7 @@ def on_files(files: Files, config: Any) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
-    """Show the path of a file of the repository where a page links to it: it is not on the site.
+    """Show what marked commands print now, and paths of the repository where a page links to them.
 
     A link to a file that does not exist stays, so that the strict build names it.
     """
@@ -40,7 +43,7 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
             return link[0]
         return f"{link[1]} (`{path}`)" if link[1].strip("`") != path else f"`{path}`"
 
-    return _LINK.sub(shown, markdown)
+    return _LINK.sub(shown, refreshed(markdown))
 
 
 def on_page_content(html: str, **_: Any) -> str:

@@ -117,3 +117,13 @@ def test_a_method_fails_where_runs_failed_but_not_where_they_were_skipped():
         "`mu` in step: 1 of 2 runs failed (failed: ValueError)"
     ]
     assert method_pages.failures_of("skipped", board) == []
+
+
+@pytest.mark.slow
+def test_marked_blocks_hold_what_their_commands_print():
+    sys.path.append(str(ROOT / "docs" / "site"))
+    import printed
+
+    for page in printed.pages():
+        text = page.read_text(encoding="utf-8")
+        assert printed.refreshed(text) == text, f"{page.name}: python docs/site/printed.py"
