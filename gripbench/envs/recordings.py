@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gripbench.errors import UndeclaredChannelError, nearest
+from gripbench.envs.signals import select_channels as select_channels
 
 
 @dataclass(frozen=True)
@@ -71,35 +71,3 @@ class Recording:
     notes: dict[str, float] = field(default_factory=dict)
     windows: dict[str, tuple[tuple[float, float], ...]] = field(default_factory=dict)
     bounds: tuple[Bounds, ...] = ()
-
-
-def select_channels(observations: npt.NDArray[Any], channels: tuple[str, ...]) -> npt.NDArray[Any]:
-    """Return a copy of the observations that holds the given channels and `time` only.
-
-    Parameters
-    ----------
-    observations
-        Structured array, shape (n,).
-    channels
-        Names of the channels that a method declared.
-
-    Returns
-    -------
-    Structured array, shape (n,), with the fields `channels` in their order, then `time`.
-
-    Raises
-    ------
-    UndeclaredChannelError
-        If the observations lack a channel.
-    """
-    names = (*channels, "time")
-    present = observations.dtype.names or ()
-    for name in names:
-        if name not in present:
-            raise UndeclaredChannelError(
-                f"the recording has no channel '{name}': {nearest(name, present)}"
-            )
-    selected = np.empty(observations.shape, [(name, np.float64) for name in names])
-    for name in names:
-        selected[name] = observations[name]
-    return selected

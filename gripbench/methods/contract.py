@@ -7,11 +7,11 @@ A method's mathematics is one function over records::
         est.force_x_front = 0.5 * params.mass * obs.accel_x
 
 `obs` holds `time` and the channels that the method declared, and two fields that the driver adds:
-`elapsed`, the time since the sample before (never negative, 0 for the first one or where the clock
-steps back), and `first`, 1 for the first sample. `params` holds the vehicle parameters and the
-method's own parameters that it declared, `state` whatever it keeps between samples, `est` the
-estimates that it declared. Numba compiles the function; `step.py_func` is the plain Python that a
-debugger can enter.
+`elapsed`, the time since the sample before (0 for the first one, else positive), and `first`, 1 for
+the first sample. Samples are whole and in order, see `gripbench.methods.samples`. `params` holds
+the vehicle parameters and the method's own parameters that it declared, `state` whatever it keeps
+between samples, `est` the estimates that it declared. Numba compiles the function; `step.py_func`
+is the plain Python that a debugger can enter.
 
 A plain class with `reset(vehicle, dt)` and `update(obs) -> dict`, and the attributes `name`,
 `sensors` and `estimates`, is a full citizen too; it only runs slower (see `Estimator`).

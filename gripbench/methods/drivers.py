@@ -1,12 +1,14 @@
-"""Two drivers of one compiled step: one sample at a time, and a whole recording in one loop."""
+"""Two drivers of one compiled step: one sample at a time, and a whole recording in one loop.
+
+Both give a step only what `gripbench.methods.samples` admits.
+"""
 
 from __future__ import annotations
 
 import inspect
-import math
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -15,8 +17,9 @@ import numpy as np
 import numpy.typing as npt
 from numba.core.errors import NumbaError
 
-from gripbench.envs.recordings import select_channels
+from gripbench.envs.signals import NEW, select_channels
 from gripbench.errors import GripbenchError, UndeclaredChannelError
+from gripbench.methods.samples import CLOCK_FIELDS, admit, layout_of, memory_of, regular
 
 if TYPE_CHECKING:
     from gripbench.methods.contract import CompiledMethod
@@ -30,13 +33,18 @@ class Records:
     obs: npt.NDArray[Any]
     params: npt.NDArray[Any]
     est: npt.NDArray[Any]
-    time: float = math.nan  # of the last sample
+    memory: npt.NDArray[np.float64] = field(init=False)
+    layout: npt.NDArray[np.int64] = field(init=False)
+
+    def __post_init__(self) -> None:
+        channels = (self.obs.dtype.names or ())[: -len(CLOCK_FIELDS)]
+        self.memory, self.layout = memory_of(channels), layout_of(channels)
 
 
 def observation_type(channels: tuple[str, ...]) -> np.dtype[Any]:
     """Return the type of the observations that a step sees."""
-    # `time` and what follows last: numba takes a record for a subtype of one that it begins with
-    return np.dtype([(name, np.float64) for name in (*channels, "time", "elapsed", "first")])
+    # The clock last: numba takes a record for a subtype of one that it begins with.
+    return np.dtype([(name, np.float64) for name in (*channels, *CLOCK_FIELDS)])
 
 
 def online(method: CompiledMethod, records: Records, obs: Mapping[str, float]) -> dict[str, float]:
@@ -45,16 +53,10 @@ def online(method: CompiledMethod, records: Records, obs: Mapping[str, float]) -
     names = (sample.dtype.names or ())[:-2]
     try:
         given = [obs[name] for name in names]
-    except KeyError as error:
-        raise UndeclaredChannelError(
-            f"{method.name}: the observation lacks the declared channel {error}"
-        ) from None
-    time, last = given[-1], records.time
-    elapsed = time - last if last < time < math.inf else 0.0
-    sample[0] = (*given, elapsed, float(last != last))
-    if math.isfinite(time):
-        records.time = time
-    _call(method, _single(method.step), records.state, sample, records.params, records.est)
+    except KeyError:
+        given = [_reading(method, obs, name) for name in names]
+    sample[0] = (*given, 0.0, 0.0)
+    _call(method, _single(method.step), *_arrays(records, sample))
     return dict(zip(method.outputs, records.est[0].item(), strict=True))
 
 
@@ -74,32 +76,41 @@ def batch(
     samples = np.empty(len(selected), observation_type(method.sensors))
     for name in selected.dtype.names or ():
         samples[name] = selected[name]
-    samples["elapsed"], samples["first"] = _clock(samples["time"])
-    _call(method, _loop(method.step), records.state, samples, records.params, records.est)
+    times = samples["time"]
+    with np.errstate(invalid="ignore"):  # of infinite times, which are not taken
+        samples["elapsed"] = np.diff(times, prepend=times[:1])
+    samples["first"] = np.arange(len(times)) == 0
+    arrays = _arrays(records, samples)
+    _call(method, _loop(method.step), *arrays, np.array(regular(arrays[4])))
     return records.est
 
 
-def _clock(times: npt.NDArray[np.float64]) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
-    """Return the time since the sample before, never negative, and which sample is the first.
+def _arrays(records: Records, samples: npt.NDArray[Any]) -> tuple[npt.NDArray[Any], ...]:
+    """Return what a compiled loop takes; `values` are the samples again, as a matrix."""
+    values = samples.view(np.float64).reshape(len(samples), -1)
+    return (
+        records.state, samples, records.params, records.est, values, records.memory, records.layout
+    )  # fmt: skip
 
-    A sample without a time takes none, and the one after it counts from the last that had one.
-    """
-    known = np.isfinite(times)
-    held = times
-    if not known.all():
-        held = times[np.maximum.accumulate(np.where(known, np.arange(len(times)), 0))]
-    passed = np.diff(held, prepend=held[:1])
-    first = np.zeros(len(times))
-    first[: (int(known.argmax()) if known.any() else len(times)) + 1] = 1.0
-    return np.where(known & (passed > 0.0), passed, 0.0), first
+
+def _reading(method: CompiledMethod, obs: Mapping[str, float], name: str) -> float:
+    """Return a channel's value; of a sensor as fast as the samples every one is new."""
+    if name in obs:
+        return obs[name]
+    if name.endswith(NEW) and name.removesuffix(NEW) in obs:
+        return float(np.isfinite(obs[name.removesuffix(NEW)]))
+    raise UndeclaredChannelError(
+        f"{method.name}: the observation lacks the declared channel '{name}'"
+    )
 
 
 @cache
 def _single(step: Callable[..., Any]) -> Callable[..., Any]:
     # Arrays of length 1 pass numba's dispatcher four times faster than single records do.
     @numba.njit(nogil=True, error_model="numpy")
-    def single(state, obs, params, est):  # type: ignore[no-untyped-def]
-        step(state[0], obs[0], params[0], est[0])
+    def single(state, obs, params, est, values, memory, layout):  # type: ignore[no-untyped-def]
+        if admit(values[0], memory, layout):
+            step(state[0], obs[0], params[0], est[0])
 
     return single
 
@@ -107,9 +118,12 @@ def _single(step: Callable[..., Any]) -> Callable[..., Any]:
 @cache
 def _loop(step: Callable[..., Any]) -> Callable[..., Any]:
     @numba.njit(nogil=True, error_model="numpy")
-    def loop(state, obs, params, est):  # type: ignore[no-untyped-def]
+    def loop(state, obs, params, est, values, memory, layout, whole):  # type: ignore[no-untyped-def]
         for k in range(obs.shape[0]):
-            step(state[0], obs[k], params[0], est[k])
+            if k > 0 and not whole[()]:
+                est[k] = est[k - 1]
+            if whole[()] or admit(values[k], memory, layout):
+                step(state[0], obs[k], params[0], est[k])
 
     return loop
 

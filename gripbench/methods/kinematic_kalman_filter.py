@@ -118,6 +118,9 @@ def advance_kinematic(state, obs, params):  # type: ignore[no-untyped-def]
         state.located = 1.0
         x[0] = obs.course + turned
         filter.P[0, 0] = variance
+        for i in range(1, 3):  # what the bias did to a heading that is no more
+            filter.P[0, i] = 0.0
+            filter.P[i, 0] = 0.0
     elif obs.time >= state.turn_until:
         correct_scalar(filter, wrapped(obs.course - (x[0] - turned)), variance)
     state.sideslip = wrapped(obs.course - (x[0] - turned))

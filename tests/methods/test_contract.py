@@ -157,9 +157,9 @@ def _clock(state, obs, params, est):
     ("times", "expected"),
     [
         ([1.0, 1.5, 1.75], [1000.0, 0.5, 0.75]),
-        ([1.0, 1.5, 1.25, 1.5], [1000.0, 0.5, 0.5, 0.75]),  # the clock steps back
-        ([1.0, np.nan, 1.5, 1.5], [1000.0, 0.0, 0.5, 0.5]),  # a time is missing
-        ([np.nan, 2.0, np.inf, 2.5], [1000.0, 1000.0, 0.0, 0.5]),
+        ([1.0, 1.5, 1.25, 1.5], [1000.0, 0.5, 0.5, 0.5]),  # the clock steps back
+        ([1.0, np.nan, 1.5, 1.5], [1000.0, 1000.0, 0.5, 0.5]),  # a time is missing
+        ([np.nan, 2.0, np.inf, 2.5], [0.0, 1000.0, 1000.0, 0.5]),
     ],
 )
 def test_the_driver_gives_the_elapsed_time(times, expected):

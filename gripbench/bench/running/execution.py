@@ -14,8 +14,7 @@ import numpy.typing as npt
 from gripbench.bench.catalogue.declarations import Declaration
 from gripbench.bench.running.rows import Runtime
 from gripbench.bench.scoring.scoring import EstimateError
-from gripbench.envs.recordings import select_channels
-from gripbench.envs.signals import record_type
+from gripbench.envs.signals import is_given, record_type, select_channels
 from gripbench.errors import GripbenchError, UndeclaredChannelError, nearest
 
 ONLINE_SAMPLES = 2000
@@ -64,7 +63,7 @@ def missing(
     declaration: Declaration, vehicle: Mapping[str, float], channels: tuple[str, ...]
 ) -> str:
     """Return why a method cannot run where only these channels are given; empty: it can."""
-    lacking = [name for name in declaration.sensors if name not in channels]
+    lacking = [name for name in declaration.sensors if not is_given(name, channels)]
     if lacking:
         return "the scenario has no sensor for " + ", ".join(f"'{name}'" for name in lacking)
     lacking = [name for name in declaration.vehicle_parameters if name not in vehicle]
