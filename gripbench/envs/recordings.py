@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gripbench.envs.signals import select_channels as select_channels
+from gripbench.envs.vehicles import CarOnPaper
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,7 @@ class Recording:
 
     scenario: str
     seed: int
-    vehicle: dict[str, float]
+    vehicle: CarOnPaper
     observations: npt.NDArray[Any]
     truth: npt.NDArray[Any]
     score_from: float = 0.0

@@ -11,6 +11,9 @@ from gripbench.envs.instruments.sensors import Sensor, load_sensor_suite
 from gripbench.envs.signals import signal
 from gripbench.errors import GripbenchError
 
+LEVELS = (0, 1, 2)
+"""Levels of spread: none, as in production, wide."""
+
 _MOST_SAMPLES = 5e7  # of one run; a longitudinal one takes 144 bytes a sample
 
 
@@ -42,9 +45,15 @@ class Scenario(Configuration):
         Sensors that differ from the suite's, or come on top.
     score_from
         Samples before this time [s] do not count in any score.
+    population
+        Name or path of the population from which a seed draws a car, a road, a drive and
+        instruments; empty: the scenario has one car only.
+    level
+        How far the draws spread: 0 not at all, 1 as in production, 2 wide. The name of a scenario
+        at a level above 0 ends with `@` and the level.
     """
 
-    name: str = Field(pattern=r"^[a-z][a-z0-9_]*$")
+    name: str = Field(pattern=r"^[a-z][a-z0-9_]*(@[1-9])?$")
     environment: str = Field(default="", pattern=r"^(gripbench/[A-Z][A-Za-z0-9]*-v[0-9]+)?$")
     description: str
     world: str
@@ -55,6 +64,8 @@ class Scenario(Configuration):
     sensor_suite: str
     sensors: dict[str, Sensor] = {}
     score_from: float = Field(default=0.0, ge=0.0)
+    population: str = ""
+    level: int = Field(default=0, ge=0, le=LEVELS[-1])
 
     @field_validator("sensors")
     @classmethod
@@ -65,6 +76,13 @@ class Scenario(Configuration):
             except GripbenchError as error:
                 raise ValueError(str(error)) from None
         return value
+
+    @model_validator(mode="after")
+    def _check_level(self) -> Self:
+        _, _, level = self.name.partition("@")
+        if int(level or 0) != self.level:
+            raise ValueError(f"name {self.name!r} does not say level {self.level}")
+        return self
 
     @model_validator(mode="after")
     def _check_horizon(self) -> Self:

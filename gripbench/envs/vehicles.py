@@ -14,6 +14,7 @@ Methods and plants name the parameters that they need; a vehicle need not give t
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
@@ -83,6 +84,10 @@ VEHICLE_PARAMETERS: dict[str, ParameterRange] = {
     "magic_b": ParameterRange("-", 0.1, 100.0, "Magic Formula stiffness factor B"),
     "magic_c": ParameterRange("-", 0.5, 3.0, "Magic Formula shape factor C"),
     "magic_e": ParameterRange("-", -20.0, 1.0, "Magic Formula curvature factor E"),
+    "friction_prior": ParameterRange(
+        "-", 0.01, 2.0, "Mean of the friction coefficients that the vehicle may meet"
+    ),
+    "friction_prior_std": ParameterRange("-", 0.0, 2.0, "Standard deviation of the same"),
 }
 """Every parameter that a vehicle file may give."""
 
@@ -122,7 +127,45 @@ class Vehicle(Configuration):
         return {name: given.value for name, given in self.parameters.items()}
 
 
-def require(vehicle: dict[str, float], names: tuple[str, ...], reader: str) -> dict[str, float]:
+class CarOnPaper(dict[str, float]):
+    """What an engineer knows of a vehicle: nominal values by parameter, SI units.
+
+    This is what methods are given. The car that a plant integrates is a `CarOnRoad`; the two are
+    different types, so that the one is never handed over for the other.
+    """
+
+
+@dataclass(frozen=True)
+class CarOnRoad:
+    """The vehicle that a plant integrates.
+
+    Attributes
+    ----------
+    parameters
+        Values by parameter, SI units.
+    radius_front, radius_rear
+        Rolling radius of an axle's tyres over `wheel_radius`.
+    peak_front, peak_rear
+        Friction that an axle's tyres find over that of the road.
+    """
+
+    parameters: dict[str, float]
+    radius_front: float = 1.0
+    radius_rear: float = 1.0
+    peak_front: float = 1.0
+    peak_rear: float = 1.0
+
+    def values(self) -> dict[str, float]:
+        """Return the parameters by name, SI units."""
+        return dict(self.parameters)
+
+
+def on_road(vehicle: Vehicle | CarOnRoad) -> CarOnRoad:
+    """Return the car on the road of a vehicle that is just as its file says."""
+    return vehicle if isinstance(vehicle, CarOnRoad) else CarOnRoad(vehicle.values())
+
+
+def require(vehicle: Mapping[str, float], names: tuple[str, ...], reader: str) -> dict[str, float]:
     """Return the named parameters of a vehicle.
 
     Raises

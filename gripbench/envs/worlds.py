@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from gripbench.configuration import CONFIGS, parse, read_toml
-from gripbench.envs.instruments.sensors import SensorSuite
+from gripbench.envs.instruments.sensors import Sensor, SensorSuite
 from gripbench.envs.plants.bicycle import BicycleScenario, BicycleSimulation
 from gripbench.envs.plants.longitudinal.world import (
     PAPER_SOLVER,
@@ -18,9 +19,15 @@ from gripbench.envs.plants.longitudinal.world import (
     LongitudinalSimulation,
 )
 from gripbench.envs.plants.planar.world import PlanarScenario, PlanarSimulation
-from gripbench.envs.plants.simulation import Simulation
+from gripbench.envs.plants.simulation import Lanes, Simulation
+from gripbench.envs.populations.draws import draw
+from gripbench.envs.populations.population import (
+    check_support,
+    load_population,
+    population_path,
+)
 from gripbench.envs.recordings import Recording
-from gripbench.envs.scenarios import Scenario
+from gripbench.envs.scenarios import LEVELS, Scenario
 from gripbench.envs.vehicles import Vehicle, load_vehicle
 from gripbench.errors import InputError, nearest, unknown
 
@@ -52,11 +59,16 @@ def scenario_files() -> dict[str, Path]:
 def load_scenario(name: str) -> Scenario:
     """Return a scenario by the name of a file that ships, or by the path of a TOML file.
 
+    `NAME@LEVEL` is the scenario at a level of its population, see `at_level`.
+
     Raises
     ------
     InputError
         If there is no such scenario or its file has a mistake.
     """
+    place, level = split_level(name)
+    if level or place != name:
+        return at_level(load_scenario(place), level)
     if name.endswith(".toml"):
         path = Path(name)
     else:
@@ -78,13 +90,126 @@ def load_scenario(name: str) -> Scenario:
     return scenario
 
 
+def at_level(scenario: Scenario, level: int) -> Scenario:
+    """Return a scenario at a level of its population; its name then ends with `@` and the level.
+
+    Raises
+    ------
+    InputError
+        If there is no such level, or the scenario names no population.
+    """
+    name = scenario.name.partition("@")[0]
+    if level not in LEVELS:
+        known = ", ".join(map(str, LEVELS))
+        raise InputError(f"{name}: unknown level {level}: known: {known}")
+    if level and not scenario.population:
+        raise InputError(f"{name}: key 'population' is missing, so there is no level {level}")
+    if level:
+        population = load_population(scenario.population)
+        check_support(
+            population,
+            load_vehicle(scenario.vehicle).values(),
+            population_path(scenario.population),
+        )
+    changes = {"name": f"{name}@{level}" if level else name, "level": level}
+    return scenario.model_copy(update=changes)
+
+
+def split_level(name: str) -> tuple[str, int]:
+    """Split `NAME@LEVEL` into name and level; without `@` the level is 0.
+
+    Raises
+    ------
+    InputError
+        If the level is no whole number.
+    """
+    place, mark, level = name.rpartition("@")
+    if not mark:
+        return name, 0
+    if not level.isdigit():
+        raise InputError(f"scenario {name!r}: what follows '@' must be a level, such as {place}@1")
+    return place, int(level)
+
+
 def simulation_of(scenario: Scenario, vehicle: Vehicle | None = None) -> Simulation:
-    """Return the simulation of a scenario, with the scenario's own vehicle unless one is given."""
+    """Return the simulation of a scenario, with the scenario's own vehicle unless one is given.
+
+    At a level above 0 every seed that it is reset with draws another car, road and drive.
+    """
+    if scenario.level:
+        return DrawnSimulation(scenario, vehicle)
     return WORLDS[scenario.world].simulation(scenario, vehicle or load_vehicle(scenario.vehicle))
 
 
-def record(scenario: Scenario, seed: int, vehicle: Vehicle | None = None) -> Recording:
-    """Simulate a scenario once and measure it with the scenario's sensors.
+def sensors_of(scenario: Scenario, seed: int) -> dict[str, Sensor]:
+    """Return the instruments by channel that a seed draws of a scenario."""
+    return draw(scenario, seed).sensors
+
+
+class DrawnSimulation(Simulation):
+    """Runs of a scenario at a level above 0: every seed has a car, a road and a drive of its own.
+
+    Parameters
+    ----------
+    scenario
+        A scenario with a population.
+    vehicle
+        The vehicle on paper; the scenario's own unless one is given.
+    """
+
+    def __init__(self, scenario: Scenario, vehicle: Vehicle | None = None) -> None:
+        self._scenario = scenario
+        self._vehicle = vehicle
+        world = WORLDS[scenario.world]
+        self.truth_type = world.truth_type  # type: ignore[misc]
+        self._begin(0)
+        self.actions = self._inner.actions  # type: ignore[misc]
+        self.sample_time = self._inner.sample_time
+
+    @property
+    def termination(self) -> str:  # type: ignore[override]
+        """Why the run ended before its horizon; empty while it goes on."""
+        return self._inner.termination
+
+    def reset(self, seed: int) -> npt.NDArray[Any]:
+        """Draw and start a run; return its first sample."""
+        self._begin(seed)
+        return self._inner.reset(seed)
+
+    def drive(self) -> npt.NDArray[np.float64]:
+        """Return what the driver commands next."""
+        return self._inner.drive()
+
+    def advance(self, action: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
+        """Hold an action for one sample time; return the sample at its end."""
+        return self._inner.advance(action)
+
+    def run(self, seed: int) -> npt.NDArray[Any]:
+        """Draw and run to the horizon or termination."""
+        self._begin(seed)
+        return self._inner.run(seed)
+
+    def notes(self) -> dict[str, float]:
+        """Return facts of the run that a score may need, by name."""
+        return self._inner.notes()
+
+    @classmethod
+    def together(cls, simulations: Sequence[Any]) -> Lanes:
+        """Return runs that advance one after the other: no two have the same car."""
+        return Lanes(simulations)
+
+    def _begin(self, seed: int) -> None:
+        drawn = draw(self._scenario, seed, self._vehicle)
+        self._inner = WORLDS[self._scenario.world].simulation(drawn.scenario, drawn.road)
+
+
+def record(
+    scenario: Scenario,
+    seed: int,
+    vehicle: Vehicle | None = None,
+    changes: Mapping[str, float] | None = None,
+) -> Recording:
+    """Simulate a scenario once and measure it with the instruments of its level.
 
     Parameters
     ----------
@@ -93,16 +218,19 @@ def record(scenario: Scenario, seed: int, vehicle: Vehicle | None = None) -> Rec
     seed
         Seed of all randomness of the run; the same seed gives the same bytes.
     vehicle
-        Vehicle to run; the scenario's own unless one is given.
+        Vehicle on paper; the scenario's own unless one is given. At level 0 it is also the one
+        that is simulated.
+    changes
+        Deviations from paper by cause that take the place of those drawn.
     """
-    vehicle = vehicle or load_vehicle(scenario.vehicle)
-    simulation = simulation_of(scenario, vehicle)
+    drawn = draw(scenario, seed, vehicle, changes)
+    simulation = WORLDS[scenario.world].simulation(drawn.scenario, drawn.road)
     truth = simulation.run(seed)
-    suite = SensorSuite(scenario.all_sensors(), simulation.truth_type, simulation.sample_time, seed)
+    suite = SensorSuite(drawn.sensors, simulation.truth_type, simulation.sample_time, seed)
     return Recording(
         scenario=scenario.name,
         seed=seed,
-        vehicle=vehicle.values(),
+        vehicle=drawn.paper,
         observations=suite.observe(truth),
         truth=truth,
         score_from=scenario.score_from,

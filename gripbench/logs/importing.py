@@ -20,6 +20,7 @@ import pandas as pd
 from gripbench.configuration import parse
 from gripbench.envs.recordings import Bounds, Recording
 from gripbench.envs.signals import NEW, record_type
+from gripbench.envs.vehicles import CarOnPaper
 from gripbench.errors import InputError
 from gripbench.logs.channel_map import ChannelMap, LogFile, load_channel_map, vehicle_values
 from gripbench.logs.derivation import derive_channels, derive_reference
@@ -226,7 +227,7 @@ def _recording(
     recording = Recording(
         scenario=channel_map.name,
         seed=run,
-        vehicle=vehicle,
+        vehicle=CarOnPaper(vehicle),
         observations=observations,
         truth=truth,
         score_from=channel_map.score_from,

@@ -16,6 +16,7 @@ import pyarrow.parquet
 
 from gripbench.envs.recordings import Bounds, Recording
 from gripbench.envs.signals import record_type
+from gripbench.envs.vehicles import CarOnPaper
 from gripbench.errors import GripbenchError, InputError
 from gripbench.logs.importing import ImportedLog, Provenance
 from gripbench.logs.quality import Finding, QualityReport
@@ -123,7 +124,7 @@ def _recording(folder: Path, about: dict[str, Any], run: dict[str, Any]) -> Reco
     return Recording(
         scenario=run["scenario"],
         seed=run["seed"],
-        vehicle=run["vehicle"],
+        vehicle=CarOnPaper(run["vehicle"]),
         observations=_read(folder / _observations(run["seed"])),
         truth=_read(folder / _truth(run["seed"])),
         score_from=run["score_from"],

@@ -9,11 +9,11 @@ from gripbench.envs.tyres.combined import (
     BRUSH,
     DUGOFF,
     MAGIC_FORMULA,
-    MAGIC_SHAPE,
     SHAPES,
     combined_force,
     secant,
 )
+from gripbench.envs.tyres.magic_formula import MAGIC_SHAPE
 
 shapes = st.sampled_from(sorted(SHAPES.values()))
 slips = st.floats(-50.0, 50.0)

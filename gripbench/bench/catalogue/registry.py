@@ -25,8 +25,8 @@ from pydantic import Field
 from gripbench import methods as built_in
 from gripbench.bench.catalogue.declarations import Declaration, Source, declaration_of
 from gripbench.configuration import CONFIGS, Configuration, parse, read_toml
-from gripbench.envs.scenarios import Scenario
-from gripbench.envs.worlds import load_scenario, scenario_files
+from gripbench.envs.scenarios import LEVELS, Scenario
+from gripbench.envs.worlds import at_level, load_scenario, scenario_files, split_level
 from gripbench.errors import InputError, unknown
 from gripbench.methods.contract import CompiledMethod
 from gripbench.sources import digest, source_digest
@@ -290,6 +290,8 @@ class Suite(Configuration):
         Number of seeds, from 0.
     targets
         Signals that tables show; empty: all that are estimated.
+    level
+        Level of the scenarios' populations; a recording has none.
     """
 
     name: str
@@ -298,6 +300,15 @@ class Suite(Configuration):
     methods: tuple[str | SuiteMethod, ...] = Field(min_length=1)
     seeds: int = Field(default=100, ge=1)
     targets: tuple[str, ...] = ()
+    level: int = Field(default=0, ge=0, le=LEVELS[-1])
+
+    def names(self, level: int | None = None) -> list[str]:
+        """Return the names of its scenarios at a level, its own unless one is given."""
+        chosen = self.level if level is None else level
+        return [
+            f"{name}@{chosen}" if chosen and "@" not in name and ":" not in name else name
+            for name in self.scenarios
+        ]
 
     def specs(self) -> list[MethodSpec]:
         """Return its methods, ready to run."""
@@ -337,6 +348,8 @@ def all_scenario_files() -> dict[str, Path]:
 def find_scenario(name: str) -> Scenario:
     """Return a scenario by name, by the path of a TOML file, or as `recording:NAME`.
 
+    `NAME@LEVEL` is the scenario at a level of its population.
+
     Raises
     ------
     InputError
@@ -347,11 +360,12 @@ def find_scenario(name: str) -> Scenario:
 
         return recorded_scenario(name)
     files = all_scenario_files()
-    if name.endswith(".toml"):
-        return load_scenario(name)
-    if name not in files:
-        raise unknown("scenario", name, files)
-    return load_scenario(str(files[name]))
+    place, level = split_level(name)
+    if not place.endswith(".toml"):
+        if place not in files:
+            raise unknown("scenario", name, files)
+        place = str(files[place])
+    return at_level(load_scenario(place), level)
 
 
 def _plugged_scenarios() -> Iterator[tuple[str, Path]]:

@@ -34,6 +34,13 @@ def run(
             "With a suite, they come on top of its methods."
         ),
     ] = None,
+    level: Annotated[
+        int | None,
+        typer.Option(
+            help="Spread of cars, roads, drives and instruments: 0 none, 1 production, 2 wide; by "
+            "default the suite's."
+        ),
+    ] = None,
     seeds: Annotated[
         str,
         typer.Option(
@@ -76,7 +83,7 @@ def run(
     if export is not None:
         check_writable(export)
     chosen = [*(scenario or []), *(f"{PREFIX}{place}" for place in recording or [])]
-    plan = plan_of(suite, chosen, method or [], seeds or None)
+    plan = plan_of(suite, chosen, method or [], seeds or None, level)
     targets = load_suite(suite).targets if suite else ()
     rows: list[Row] = []
     with progress("running", plan.size) as bar:

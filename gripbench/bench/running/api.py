@@ -14,7 +14,8 @@ from gripbench.bench.running.rows import Row, frame_of
 from gripbench.bench.running.runner import Plan, run_plan
 from gripbench.bench.running.sandbox import Limits
 from gripbench.bench.running.store import DEFAULT_RESULTS, Store
-from gripbench.envs.scenarios import Scenario
+from gripbench.envs.scenarios import LEVELS, Scenario
+from gripbench.envs.worlds import at_level
 from gripbench.errors import InputError
 
 MOST_SEEDS = 1_000_000
@@ -27,6 +28,7 @@ def run(
     methods: Iterable[Any] = (),
     seeds: int | str | range | None = None,
     *,
+    level: int | None = None,
     results: Path | str = DEFAULT_RESULTS,
     workers: int = 0,
     backend: str = "loky",
@@ -49,6 +51,8 @@ def run(
     seeds
         Number of seeds from 0, `"A:B"` for A to B-1, or a range; by default the suite's, else 1.
         The seeds of a recording are its windows, by default all of them.
+    level
+        Level of the scenarios' populations, 0 to 2; by default the suite's, or as their names say.
     results
         Folder of the stored rows; what is there already is not run again.
     workers
@@ -69,7 +73,7 @@ def run(
     InputError
         If a name is unknown or a method cannot be loaded.
     """
-    plan = plan_of(suite, tuple(scenarios), tuple(methods), seeds)
+    plan = plan_of(suite, tuple(scenarios), tuple(methods), seeds, level)
     rows: list[Row] = []
     run_plan(
         plan,
@@ -103,14 +107,18 @@ def plan_of(
     scenarios: Sequence[str | Scenario],
     methods: Sequence[Any],
     seeds: int | str | range | None,
+    level: int | None = None,
 ) -> Plan:
     """Return the plan that these choices make; see `run`."""
     chosen: list[Any] = list(scenarios)
     specs = []
+    if level is not None and level not in LEVELS:
+        raise InputError(f"level {level}: known: {', '.join(map(str, LEVELS))}")
     all_windows = seeds is None
     if suite:
         loaded = load_suite(suite)
-        chosen = chosen or list(loaded.scenarios)
+        if not chosen:
+            chosen, level = list(loaded.names(level)), None
         specs = loaded.specs()
         seeds = loaded.seeds if seeds is None else seeds
     labels = {spec.label for spec in specs}
@@ -119,10 +127,11 @@ def plan_of(
         raise InputError("nothing to run: give a suite or a scenario")
     if not specs:
         raise InputError("nothing to run: give a suite or a method")
+    found = [item if isinstance(item, Scenario) else find_scenario(item) for item in chosen]
+    if level is not None:
+        found = [at_level(item, level) for item in found]
     plan = Plan(
-        scenarios=tuple(
-            item if isinstance(item, Scenario) else find_scenario(item) for item in chosen
-        ),
+        scenarios=tuple(found),
         methods=tuple(specs),
         seeds=seeds_of(seeds),
         windows=None if all_windows else seeds_of(seeds),

@@ -22,6 +22,7 @@ import gripbench
 from gripbench.bench.running import recorded_scenarios
 from gripbench.bench.scoring.metrics import metrics
 from gripbench.envs import worlds
+from gripbench.envs.populations.draws import drawn_from
 from gripbench.envs.scenarios import Scenario
 from gripbench.envs.vehicles import load_vehicle
 from gripbench.sources import digest, source_digest
@@ -60,6 +61,9 @@ def scenario_digest(scenario: Scenario) -> str:
         "sensors": {name: item.model_dump() for name, item in scenario.all_sensors().items()},
         "vehicle": load_vehicle(scenario.vehicle).values(),
     }
+    if scenario.level:
+        content["population"] = drawn_from(scenario)
+        files.append(Path(inspect.getfile(drawn_from)))
     sources = source_digest(*files, *(_PROJECT / "envs" / name for name in _RECORDING))
     return digest(json.dumps(content, sort_keys=True), sources, inspect.getsource(worlds.record))
 

@@ -1,21 +1,22 @@
 """Sensors: what an instrument makes of the truth.
 
-The chain of one channel is: truth, delay, scale, bias and drift, noise, low-pass, quantisation,
-sampling. The same compiled function serves a whole recording and one sample of the Gymnasium
-environment, and every channel draws from a stream of its own, so that a sensor's errors do not
-depend on which other sensors there are.
+The chain of one channel is: truth with the parts of a lever arm and of a misaligned axis, delay,
+wheel pulses, scale, bias and drift, noise, low-pass, quantisation, sampling. The same compiled
+function serves a whole recording and one sample of the Gymnasium environment, and every channel
+draws from a stream of its own, so that a sensor's errors do not depend on which other sensors there
+are.
 """
 
 from __future__ import annotations
 
 import zlib
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Self
 
 import numba
 import numpy as np
 import numpy.typing as npt
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from gripbench.configuration import CONFIGS, Configuration, parse, read_toml
 from gripbench.envs.signals import NEW, record_type, signal
@@ -50,6 +51,16 @@ class Sensor(Configuration):
         ones; 0: every sample.
     delay
         Age [s] of the truth in a reading.
+    negative_scale
+        Further scale factor of readings below zero: braking torque beside driving torque.
+    cross, misalignment, misalignment_std
+        Signal along the axis into which the instrument leans, by which angle [rad], and the
+        standard deviation of one that is drawn for each seed.
+    lever_x, lever_y
+        Place of an accelerometer or speed sensor before and left of the centre of gravity [m].
+    pulses
+        Teeth of a wheel speed sensor's ring: the reading is the mean speed between the last tooth
+        of this reading and that of the one before; 0: the speed itself.
     """
 
     source: str = ""
@@ -64,6 +75,19 @@ class Sensor(Configuration):
     quantisation: float = Field(default=0.0, ge=0.0)
     rate: float = Field(default=0.0, ge=0.0)
     delay: float = Field(default=0.0, ge=0.0, le=10.0)
+    negative_scale: float = Field(default=1.0, gt=0.0)
+    cross: str = ""
+    misalignment: float = Field(default=0.0, ge=-0.5, le=0.5)
+    misalignment_std: float = Field(default=0.0, ge=0.0, le=0.2)
+    lever_x: float = Field(default=0.0, ge=-10.0, le=10.0)
+    lever_y: float = Field(default=0.0, ge=-10.0, le=10.0)
+    pulses: int = Field(default=0, ge=0, le=10000)
+
+    @model_validator(mode="after")
+    def _check_cross(self) -> Self:
+        if (self.misalignment or self.misalignment_std) and not self.cross:
+            raise ValueError("misalignment needs 'cross': the signal along the other axis")
+        return self
 
 
 class _SuiteFile(Configuration):
@@ -92,6 +116,15 @@ _SPEC = np.dtype(
         ("quantisation", np.float64),
         ("rate", np.float64),
         ("delay", np.int64),  # samples
+        ("negative", np.float64),  # further scale below zero
+        ("cross", np.int64),  # column of the axis into which it leans, -1: none
+        ("lean", np.float64),  # sine of the misalignment
+        ("level", np.float64),  # its cosine
+        ("turn", np.int64),  # column of the yaw rate, -1: no lever arm
+        ("spin_lever", np.float64),  # over the yaw acceleration
+        ("turn_lever", np.float64),  # over the yaw rate
+        ("square_lever", np.float64),  # over its square
+        ("tooth", np.float64),  # angle between two teeth [rad], 0: none
         ("output", np.int64),  # column of the reading
         ("flag", np.int64),  # column of its `_new` flag, -1: none
     ]
@@ -105,8 +138,41 @@ _STATE = np.dtype(
         ("reading", np.float64),
         ("sample_index", np.float64),
         ("time", np.float64),
+        ("yaw_rate", np.float64),
+        ("angle", np.float64),  # of the wheel beyond its last tooth [rad]
+        ("teeth", np.float64),  # since the last reading
+        ("tooth_time", np.float64),  # when the last tooth passed
+        ("counted", np.float64),  # speed of the last reading
+        ("counted_time", np.float64),  # the same, of the last reading
     ]
 )
+
+
+@numba.njit(cache=True, error_model="numpy", nogil=True)
+def _count_teeth(time, elapsed, speed, new, spec, state):  # type: ignore[no-untyped-def]
+    """Return the wheel speed [rad/s] that the times of the teeth give.
+
+    Where no tooth has passed since the last reading, the wheel turns no faster than the time since
+    then allows.
+    """
+    state.angle += abs(speed) * elapsed
+    passed = np.floor(state.angle / spec.tooth)
+    if passed > 0.0:
+        state.teeth += passed
+        state.angle -= passed * spec.tooth
+        state.tooth_time = time - state.angle / abs(speed)
+    if elapsed <= 0.0:
+        state.counted = speed  # the reading before the first teeth is right
+    elif new and state.teeth > 0.0:
+        span = state.tooth_time - state.counted_time
+        counted = state.teeth * spec.tooth / span if span > 0.0 else abs(speed)
+        state.counted = counted if speed >= 0.0 else -counted
+        state.counted_time = state.tooth_time
+        state.teeth = 0.0
+    elif new:
+        most = spec.tooth / (time - state.counted_time)
+        state.counted = min(max(state.counted, -most), most)
+    return state.counted
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
@@ -118,10 +184,24 @@ def _measure(k, truth, specs, states, history, noise, walk, out):  # type: ignor
     for j in range(specs.shape[0]):
         spec = specs[j]
         state = states[j]
-        history[k % length, j] = truth[spec.column]
-        value = history[max(k - spec.delay, 0) % length, j]
         elapsed = time - state.time if k > 0 else 0.0
+        value = truth[spec.column]
+        if spec.turn >= 0:
+            rate = truth[spec.turn]
+            spin = (rate - state.yaw_rate) / elapsed if elapsed > 0.0 else 0.0
+            state.yaw_rate = rate
+            value += spec.spin_lever * spin + (spec.turn_lever + spec.square_lever * rate) * rate
+        if spec.cross >= 0:
+            value = spec.level * value + spec.lean * truth[spec.cross]
+        history[k % length, j] = value
+        value = history[max(k - spec.delay, 0) % length, j]
         state.time = time
+        new = True
+        if spec.rate > 0.0:
+            sample = np.floor(time * spec.rate + 1e-9)
+            new = k == 0 or sample != state.sample_index
+        if spec.tooth > 0.0:
+            value = _count_teeth(time, elapsed, value, new, spec, state)
         state.drift += spec.walk * np.sqrt(elapsed) * walk[j]
         index = np.floor(time / spec.noise_hold + 1e-9) if spec.noise_hold > 0.0 else float(k)
         if k == 0 or index != state.noise_index:
@@ -133,13 +213,13 @@ def _measure(k, truth, specs, states, history, noise, walk, out):  # type: ignor
                 share = -np.expm1(-elapsed / spec.lowpass)
                 value = state.filtered + share * (value - state.filtered)
             state.filtered = value
+        if value < 0.0:
+            value *= spec.negative
         if spec.quantisation > 0.0:
             value = spec.quantisation * np.round(value / spec.quantisation)
         if spec.rate > 0.0:
-            index = np.floor(time * spec.rate + 1e-9)
-            new = k == 0 or index != state.sample_index
             if new:
-                state.sample_index = index
+                state.sample_index = sample
                 state.reading = value
             value = state.reading
             out[spec.flag] = 1.0 if new else 0.0
@@ -199,7 +279,7 @@ class SensorSuite:
             first, drawn, walked = np.random.SeedSequence(
                 [seed, zlib.crc32(channel.encode())]
             ).spawn(3)
-            constant = np.random.default_rng(first).standard_normal(2)
+            constant = np.random.default_rng(first).standard_normal(3)
             self._streams.append((np.random.default_rng(drawn), np.random.default_rng(walked)))
             spec = self._specs[j]
             spec["column"] = truth_names.index(source)
@@ -211,6 +291,16 @@ class SensorSuite:
             spec["lowpass"] = sensor.lowpass
             spec["quantisation"] = sensor.quantisation
             spec["rate"] = sensor.rate
+            spec["negative"] = sensor.negative_scale
+            lean = sensor.misalignment + sensor.misalignment_std * constant[2]
+            spec["cross"] = _column(truth_names, sensor.cross, channel, "cross") if lean else -1
+            spec["lean"], spec["level"] = np.sin(lean), np.cos(lean)
+            spec["turn"] = -1
+            if sensor.lever_x or sensor.lever_y:
+                spec["turn"] = _column(truth_names, "yaw_rate", channel, "lever_x")
+                levers = _levers(source, sensor, channel)
+                spec["spin_lever"], spec["turn_lever"], spec["square_lever"] = levers
+            spec["tooth"] = 2.0 * np.pi / sensor.pulses if sensor.pulses else 0.0
             spec["delay"] = round(sensor.delay / sample_time) if sample_time else 0
             spec["output"] = names.index(channel)
             spec["flag"] = names.index(channel + NEW) if sensor.rate > 0.0 else -1
@@ -341,6 +431,30 @@ def _measure_lanes(lanes, samples, truth, specs, states, history, noise, walk, o
             walk[lane, at],
             out[lane],
         )
+
+
+def _column(names: tuple[str, ...], wanted: str, channel: str, key: str) -> int:
+    """Return the column of a signal of the truth that a sensor feels besides its own."""
+    if wanted not in names:
+        raise InputError(f"sensors.{channel}.{key}: the plant gives no '{wanted}'")
+    return names.index(wanted)
+
+
+def _levers(source: str, sensor: Sensor, channel: str) -> tuple[float, float, float]:
+    """Return what a lever arm puts before yaw acceleration, yaw rate and its square."""
+    x, y = sensor.lever_x, sensor.lever_y
+    known = {
+        "accel_x": (-y, 0.0, -x),
+        "accel_y": (x, 0.0, -y),
+        "speed_x": (0.0, -y, 0.0),
+        "speed_gps": (0.0, -y, 0.0),
+        "speed_y": (0.0, x, 0.0),
+    }
+    if source not in known:
+        raise InputError(
+            f"sensors.{channel}.lever_x: a lever arm changes {', '.join(known)}, not '{source}'"
+        )
+    return known[source]
 
 
 def _as_matrix(records: npt.NDArray[Any]) -> npt.NDArray[np.float64]:

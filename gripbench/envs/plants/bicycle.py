@@ -36,7 +36,7 @@ from gripbench.envs.plants.simulation import Action, Simulation
 from gripbench.envs.roads.road import SPACING as ROAD_SPACING
 from gripbench.envs.roads.road import lay_road, stream
 from gripbench.envs.signals import record_type
-from gripbench.envs.vehicles import GRAVITY, Vehicle, require
+from gripbench.envs.vehicles import GRAVITY, CarOnRoad, Vehicle, require
 from gripbench.errors import InputError
 
 PARAMETERS = (
@@ -271,7 +271,7 @@ class BicycleSimulation(Simulation):
     )
     truth_type: ClassVar[np.dtype[Any]] = TRUTH
 
-    def __init__(self, scenario: BicycleScenario, vehicle: Vehicle) -> None:
+    def __init__(self, scenario: BicycleScenario, vehicle: Vehicle | CarOnRoad) -> None:
         self._scenario = scenario
         self._vehicle = vehicle
         self.sample_time = scenario.sample_time
@@ -337,7 +337,7 @@ class BicycleSimulation(Simulation):
         )
 
 
-def _plant_record(vehicle: Vehicle) -> npt.NDArray[Any]:
+def _plant_record(vehicle: Vehicle | CarOnRoad) -> npt.NDArray[Any]:
     given = require(vehicle.values(), PARAMETERS, "the bicycle")
     base = given["cg_to_front"] + given["cg_to_rear"]
     record = np.zeros(1, plant.PLANT)

@@ -25,7 +25,7 @@ class DoubleLaneChange(Configuration):
 
     kind: Literal["double_lane_change"]
     lead_in: float = Field(default=6.0, gt=0.0, description="straight before it [s]")
-    offset: float = Field(default=3.5, gt=0.0, le=10.0, description="of the other lane [m]")
+    offset: float = Field(default=3.5, ge=-10.0, le=10.0, description="of the other lane [m]")
 
 
 class Slalom(Configuration):
@@ -33,7 +33,7 @@ class Slalom(Configuration):
 
     kind: Literal["slalom"]
     lead_in: float = Field(default=6.0, gt=0.0, description="straight before it [s]")
-    amplitude: float = Field(gt=0.0, le=20.0, description="[m]")
+    amplitude: float = Field(ge=-20.0, le=20.0, description="first to the left [m]")
     wavelength: float = Field(ge=5.0, description="[m]")
     waves: int = Field(default=5, ge=1, le=100)
 

@@ -25,6 +25,14 @@ SPACING = 0.25
 """Distance [m] between two points of a profile."""
 
 
+class Surface(Configuration):
+    """A stretch of the path with a friction coefficient of its own."""
+
+    start: float = Field(ge=0.0, description="distance along the path [m]")
+    mu: float = Field(gt=0.0, le=2.0)
+    length: float = Field(gt=0.0, description="[m]")
+
+
 class Road(Configuration):
     """The road's friction and shape.
 
@@ -45,8 +53,12 @@ class Road(Configuration):
         curvature.
     bank_std, grade_std
         Standard deviation [rad] of smooth noise on both.
+    mu_std
+        Standard deviation of smooth noise on the logarithm of the friction coefficient.
     correlation_length
         Of the noise [m].
+    surfaces
+        Stretches of another friction coefficient, under both sides, the later one on top.
     """
 
     mu: float = Field(gt=0.0, le=2.0)
@@ -59,7 +71,9 @@ class Road(Configuration):
     turn_bank: float = Field(default=0.0, ge=0.0, le=0.5)
     bank_std: float = Field(default=0.0, ge=0.0, le=0.2)
     grade_std: float = Field(default=0.0, ge=0.0, le=0.2)
+    mu_std: float = Field(default=0.0, ge=0.0, le=0.5)
     correlation_length: float = Field(default=40.0, ge=1.0)
+    surfaces: tuple[Surface, ...] = ()
 
     @model_validator(mode="after")
     def _check_jump(self) -> Self:
@@ -112,7 +126,10 @@ GROUND = np.dtype(
 
 @dataclass(frozen=True)
 class Ground:
-    """The road of one run: its friction (one record of `GROUND`) and profiles (n, 2)."""
+    """The road of one run: its friction (one record of `GROUND`) and profiles (n, 3).
+
+    The profiles hold bank and grade [rad] and the friction over that of the record.
+    """
 
     friction: npt.NDArray[np.void]
     profile: npt.NDArray[np.float64]
@@ -138,9 +155,21 @@ def lay_road(road: Road, curvature: npt.NDArray[np.float64], length: float, seed
         Seed of the run.
     """
     points = int(length / SPACING) + 4
-    profile = np.empty((points, 2))
-    profile[:, 0] = road.bank + road.bank_std * _smooth(road, points, seed, "bank")
-    profile[:, 1] = road.grade + road.grade_std * _smooth(road, points, seed, "grade")
+    profile = np.empty((points, 3))
+    profile[:, 0] = road.bank + road.bank_std * smooth_noise(
+        road.correlation_length, points, seed, "bank"
+    )
+    profile[:, 1] = road.grade + road.grade_std * smooth_noise(
+        road.correlation_length, points, seed, "grade"
+    )
+    profile[:, 2] = 1.0
+    if road.mu_std > 0.0:
+        profile[:, 2] = np.exp(
+            road.mu_std * smooth_noise(road.correlation_length, points, seed, "mu")
+        )
+    for surface in road.surfaces:
+        first = round(surface.start / SPACING)
+        profile[first : first + round(surface.length / SPACING), 2] *= surface.mu / road.mu
     if road.turn_bank > 0.0 and len(curvature):
         sharpest = np.abs(curvature).max()
         shared = min(points, len(curvature))
@@ -154,11 +183,14 @@ def lay_road(road: Road, curvature: npt.NDArray[np.float64], length: float, seed
     return Ground(friction, profile)
 
 
-def _smooth(road: Road, points: int, seed: int, name: str) -> npt.NDArray[np.float64]:
-    """Return Gaussian noise of unit variance whose autocorrelation falls to 1/e in the length."""
+def smooth_noise(length: float, points: int, seed: int, name: str) -> npt.NDArray[np.float64]:
+    """Return Gaussian noise of unit variance whose autocorrelation falls to 1/e in the length [m].
+
+    Shape (points,), one value every `SPACING`.
+    """
     from scipy.ndimage import gaussian_filter1d  # slow to import, and few roads are random
 
-    width = 0.5 * road.correlation_length / SPACING
+    width = 0.5 * length / SPACING
     margin = math.ceil(4.0 * width)
     white = stream(seed, f"road.{name}").standard_normal(points + 2 * margin)
     # A Gaussian kernel of deviation w gives the autocorrelation exp(-(lag / 2 w)^2).
@@ -207,6 +239,7 @@ def feel_road(x, p, friction, profile, u):  # type: ignore[no-untyped-def]
     part = place - first
     bank_slope = profile[first + 1, 0] - profile[first, 0]
     grade_slope = profile[first + 1, 1] - profile[first, 1]
+    surface = profile[first, 2] + part * (profile[first + 1, 2] - profile[first, 2])
     bank = profile[first, 0] + part * bank_slope
     grade = profile[first, 1] + part * grade_slope
     u[plant.BANK] = bank
@@ -243,5 +276,5 @@ def feel_road(x, p, friction, profile, u):  # type: ignore[no-untyped-def]
             along = x[plant.X] + cos_yaw * ahead - sin_yaw * aside
             reached = (along - friction.mu_jump_at) / friction.mu_jump_length
             mu += min(max(reached, 0.0), 1.0) * (friction.mu_after - mu)
-        u[plant.MU + i] = mu
+        u[plant.MU + i] = mu * surface * (p.peak_front if i < 2 else p.peak_rear)
     plant.hold_stiffness(x, p, u)

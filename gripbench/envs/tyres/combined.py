@@ -1,4 +1,4 @@
-"""Tyre forces under combined slip: brush, Dugoff and Magic Formula behind one interface.
+"""Tyre forces under combined slip: every shape of tyre, a file each, behind one interface.
 
 Each shape is a function f of the normalised slip
 
@@ -6,9 +6,7 @@ Each shape is a function f of the normalised slip
 
 and the force is mu F_z f(s) along (C_x sigma_x, C_y sigma_y), where sigma is the sliding velocity
 of the contact patch over the rolling speed of the wheel. With f'(0) = 1 the stiffnesses C are the
-slopes at zero slip, and with f <= 1 the force never leaves the friction circle. In pure lateral
-slip the brush shape is equation 15 of Yoon, Li & Ahn (2016) with |sigma| in its condition, and
-the Dugoff shape is equations 2 to 4 of Dakhlallah, Glaser, Mammar & Sebsadji (2008).
+slopes at zero slip, and with f <= 1 the force never leaves the friction circle.
 """
 
 from __future__ import annotations
@@ -17,15 +15,20 @@ import math
 
 import numba
 
+from gripbench.envs.tyres import brush, dugoff, fitted_curve, magic_formula
+
 BRUSH = 0
 DUGOFF = 1
 MAGIC_FORMULA = 2
+FITTED_CURVE = 3
 
-SHAPES: dict[str, int] = {"brush": BRUSH, "dugoff": DUGOFF, "magic_formula": MAGIC_FORMULA}
+SHAPES: dict[str, int] = {
+    "brush": BRUSH,
+    "dugoff": DUGOFF,
+    "magic_formula": MAGIC_FORMULA,
+    "fitted_curve": FITTED_CURVE,
+}
 """Code of each shape by the name that scenario files use."""
-
-MAGIC_SHAPE = 1.3
-"""Shape factor of the Magic Formula shape, sin(1.3 atan(s / 1.3))."""
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
@@ -35,21 +38,29 @@ def secant(shape, s):  # type: ignore[no-untyped-def]
     Parameters
     ----------
     shape
-        One of `BRUSH`, `DUGOFF`, `MAGIC_FORMULA`.
+        One of the codes of `SHAPES`.
     s
         Normalised slip [-].
     """
     if shape == BRUSH:
-        if s < 3.0:
-            return 1.0 - s / 3.0 + s * s / 27.0
-        return 1.0 / s
+        return brush.secant(s)
     if shape == DUGOFF:
-        if s < 0.5:
-            return 1.0
-        return (1.0 - 0.25 / s) / s
-    if s < 1e-6:
-        return 1.0
-    return math.sin(MAGIC_SHAPE * math.atan(s / MAGIC_SHAPE)) / s
+        return dugoff.secant(s)
+    if shape == FITTED_CURVE:
+        return fitted_curve.secant(s)
+    return magic_formula.secant(s)
+
+
+@numba.njit(cache=True, error_model="numpy", nogil=True)
+def tangent(shape, s):  # type: ignore[no-untyped-def]
+    """Return f'(s), the slope of a shape at the normalised slip s >= 0; arguments as `secant`."""
+    if shape == BRUSH:
+        return brush.tangent(s)
+    if shape == DUGOFF:
+        return dugoff.tangent(s)
+    if shape == FITTED_CURVE:
+        return fitted_curve.tangent(s)
+    return magic_formula.tangent(s)
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
@@ -59,7 +70,7 @@ def combined_force(shape, slip_x, slip_y, stiffness_x, stiffness_y, capacity):  
     Parameters
     ----------
     shape
-        One of `BRUSH`, `DUGOFF`, `MAGIC_FORMULA`.
+        One of the codes of `SHAPES`.
     slip_x, slip_y
         Sliding velocity over rolling speed, with the sign of the force that it causes [-].
     stiffness_x, stiffness_y

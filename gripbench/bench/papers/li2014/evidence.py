@@ -23,7 +23,7 @@ from gripbench.envs.instruments.sensors import SensorSuite
 from gripbench.envs.plants.longitudinal.world import LongitudinalScenario, LongitudinalSimulation
 from gripbench.envs.recordings import Recording
 from gripbench.envs.scenarios import Scenario
-from gripbench.envs.vehicles import GRAVITY, load_vehicle
+from gripbench.envs.vehicles import GRAVITY, CarOnPaper, load_vehicle
 from gripbench.envs.worlds import load_scenario, record
 from gripbench.methods.proposed_observer import ProposedObserver
 
@@ -68,7 +68,9 @@ def _of_vehicle(parameter: str, value: float) -> Recorder:
         simulation = LongitudinalSimulation(scenario, vehicle)
         truth = simulation.run(seed)
         suite = SensorSuite(scenario.all_sensors(), simulation.truth_type, None, seed)
-        return Recording(scenario.name, seed, vehicle.values(), suite.observe(truth), truth)
+        return Recording(
+            scenario.name, seed, CarOnPaper(vehicle.values()), suite.observe(truth), truth
+        )
 
     return recorder
 

@@ -77,7 +77,7 @@ def ros3(x, step, duration, inputs, plant, tyres):  # type: ignore[no-untyped-de
         Record of `TYRE_TYPE` that belongs to `x` before the call.
     """
     gravity = gravity_along(inputs)
-    radius = plant.wheel_radius
+    radius = plant.wheel_radius  # a scale for the error, not the axles' own
     v, f, r = x[0], x[1], x[2]  # velocity, front axle, rear axle
     force_front = inputs.mu_front * plant.load_front * tyres.front
     force_rear = inputs.mu_rear * plant.load_rear * tyres.rear

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gripbench.envs.drivers.profiles import profile_value
 from gripbench.envs.plants.longitudinal.plant import INPUT_TYPE, TYRE_TYPE, compiled
 from gripbench.envs.plants.longitudinal.world import (
     NOISE_BLOCK,
@@ -16,6 +15,7 @@ from gripbench.envs.plants.longitudinal.world import (
     LongitudinalSimulation,
     advance_one,
     command,
+    decide,
 )
 from gripbench.envs.plants.simulation import Lanes, Simulation
 
@@ -35,7 +35,7 @@ class LongitudinalLanes(Lanes):
         self._k = np.zeros(count, np.int64)
         self._jumps = np.zeros((count, NOISE_BLOCK, 2))
         self._tyres = np.zeros(count, TYRE_TYPE)
-        self._inputs = np.zeros(1, INPUT_TYPE)
+        self._inputs = np.zeros(count, INPUT_TYPE)
         self._ended = [""] * count
         self._stack()
 
@@ -57,6 +57,8 @@ class LongitudinalLanes(Lanes):
         truth = run.reset(seed)
         self._x[lane], self._steps[lane], self._k[lane] = run._x, run._step, 0
         self._tyres[lane] = run._tyres[0]
+        self._inputs[lane] = run._inputs[0]
+        self._lay_roads()
         self._ended[lane] = ""
         return truth
 
@@ -64,7 +66,10 @@ class LongitudinalLanes(Lanes):
         """Return the torques of the scenario's profiles in each lane."""
         front, rear, _ = self._profiles
         torques = np.empty((len(self._runs), 2))
-        _drive_lanes(self._k, self._runs[0].scenario.sample_time, front, rear, torques)
+        _drive_lanes(
+            self._k, self._runs[0].scenario.sample_time, self._x, front, rear, self._slip_limits,
+            self._plants, torques,
+        )  # fmt: skip
         return torques
 
     def advance(
@@ -86,8 +91,9 @@ class LongitudinalLanes(Lanes):
             self._inputs,
             self._plants,
             first._integrator,
-            self._profiles,
+            self._profiles[2],
             self._grades,
+            self._roads,
             self._jumps,
             self._tyres,
             first._work,
@@ -105,6 +111,8 @@ class LongitudinalLanes(Lanes):
         """
         self._plants = np.concatenate([run._plant for run in self._runs])
         self._grades = np.array([run.scenario.road_grade for run in self._runs])
+        self._slip_limits = np.array([run.scenario.driver.slip_limit for run in self._runs])
+        self._lay_roads()
         stacked = []
         for part in range(3):
             pieces = [run._profiles[part] for run in self._runs]
@@ -114,13 +122,22 @@ class LongitudinalLanes(Lanes):
             stacked.append(table)
         self._profiles = tuple(stacked)
 
+    def _lay_roads(self) -> None:
+        """Lay the roads of the lanes side by side; behind its end a road stays as it is."""
+        roads = [run._road for run in self._runs]
+        longest = max(map(len, roads))
+        self._roads = np.stack(
+            [np.pad(road, ((0, longest - len(road)), (0, 0)), mode="edge") for road in roads]
+        )
+
 
 @compiled
-def _drive_lanes(k, sample_time, front, rear, torques):  # type: ignore[no-untyped-def]
+def _drive_lanes(k, sample_time, x, front, rear, slip_limits, plants, torques):  # type: ignore[no-untyped-def]
     for lane in range(k.shape[0]):
-        middle = (k[lane] + 0.5) * sample_time
-        torques[lane, 0] = profile_value(middle, front[lane])
-        torques[lane, 1] = profile_value(middle, rear[lane])
+        decide(
+            k[lane], sample_time, x[lane], front[lane], rear[lane], slip_limits[lane],
+            plants[lane], torques[lane],
+        )  # fmt: skip
 
 
 @compiled
@@ -134,26 +151,27 @@ def _advance_lanes(  # type: ignore[no-untyped-def]
     inputs,
     plants,
     integrator,
-    profiles,
+    friction,
     grades,
+    roads,
     jumps,
     tyres,
     work,
     truth,
 ):
-    front, rear, friction = profiles
     for lane in lanes:
+        now = inputs[lane]
         command(
-            k[lane], sample_time, front[lane], rear[lane], friction[lane], grades[lane], inputs[0]
+            k[lane], sample_time, friction[lane], grades[lane], roads[lane], plants[lane], now
         )
-        inputs[0].torque_front = actions[lane, 0]
-        inputs[0].torque_rear = actions[lane, 1]
+        now.torque_front = actions[lane, 0]
+        now.torque_rear = actions[lane, 1]
         steps[lane] = advance_one(
             k[lane],
             sample_time,
             x[lane],
             steps[lane],
-            inputs[0],
+            now,
             plants[lane],
             integrator,
             jumps[lane, k[lane] % jumps.shape[1]],

@@ -10,18 +10,20 @@ ones. Table III's C_r = 1.5 is replaced in the vehicle's file.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import sin
 
 import numba
 import numpy as np
 
+from gripbench.envs.tyres.combined import MAGIC_FORMULA, SHAPES, secant, tangent
 from gripbench.envs.tyres.longitudinal import (
     magic_formula,
     magic_formula_slope,
     slip_ratio,
     slip_ratio_slopes,
 )
-from gripbench.envs.vehicles import GRAVITY, require
+from gripbench.envs.vehicles import GRAVITY, CarOnRoad, require
 
 HOLD_SPEED = 0.05
 """Speed [m/s] below which resistances that oppose the motion fade to zero."""
@@ -39,19 +41,41 @@ PLANT_PARAMETERS = (
     "magic_e",
 )
 
-_RECIPROCALS = ("per_mass", "per_inertia", "lever")
+_DERIVED = (
+    "load_front",
+    "load_rear",
+    "per_mass",
+    "per_inertia",
+    "radius_front",
+    "radius_rear",
+    "lever_front",
+    "lever_rear",
+    "peak_front",
+    "peak_rear",
+    "initial_slope",
+)
 
 PLANT_TYPE = np.dtype(
-    [(name, np.float64) for name in (*PLANT_PARAMETERS, "load_front", "load_rear", *_RECIPROCALS)]
+    [*((name, np.float64) for name in (*PLANT_PARAMETERS, *_DERIVED)), ("tyre", np.int64)]
 )
+"""What the compiled plant knows of the car on the road; its own friction over the road's is `peak`,
+the slope of its force curve at zero slip over mu F_z is `initial_slope`."""
 
 INPUT_TYPE = np.dtype(
     [
         (name, np.float64)
-        for name in ("torque_front", "torque_rear", "mu_front", "mu_rear", "road_grade")
+        for name in (
+            "torque_front",
+            "torque_rear",
+            "mu_front",
+            "mu_rear",
+            "road_grade",
+            "distance",
+        )
     ]
 )
-"""What acts on the plant during one interval: axle torques [N m], friction, road grade [rad]."""
+"""What acts on the plant during one interval: axle torques [N m], friction, road grade [rad]; and
+the distance [m] along the road at which it begins."""
 
 TYRE_TYPE = np.dtype(
     [
@@ -65,9 +89,21 @@ compiled = numba.njit(cache=True, error_model="numpy", nogil=True)
 _inline = numba.njit(inline="always", error_model="numpy")
 
 
-def plant_record(vehicle: dict[str, float]) -> np.ndarray:
-    """Return the plant's parameters as a record array of length 1; static axle loads by eq. 6."""
-    given = require(vehicle, PLANT_PARAMETERS, "the longitudinal plant")
+def plant_record(
+    vehicle: Mapping[str, float] | CarOnRoad, tyre: str = "magic_formula"
+) -> np.ndarray:
+    """Return the plant's parameters as a record array of length 1; static axle loads by eq. 6.
+
+    Parameters
+    ----------
+    vehicle
+        The car on the road, or its parameters alone.
+    tyre
+        Shape of its tyres' force curve, a key of `gripbench.envs.tyres.combined.SHAPES`. All have
+        the slope B C at zero slip; `magic_formula` is the one with the car's own C and E.
+    """
+    car = vehicle if isinstance(vehicle, CarOnRoad) else CarOnRoad(dict(vehicle))
+    given = require(car.values(), PLANT_PARAMETERS, "the longitudinal plant")
     plant = np.zeros(1, PLANT_TYPE)
     for name, value in given.items():
         plant[name] = value
@@ -77,7 +113,13 @@ def plant_record(vehicle: dict[str, float]) -> np.ndarray:
     plant["load_rear"] = weight * given["cg_to_front"] / wheelbase
     plant["per_mass"] = 1.0 / given["mass"]
     plant["per_inertia"] = 1.0 / given["wheel_inertia"]
-    plant["lever"] = given["wheel_radius"] / given["wheel_inertia"]
+    for axle in ("front", "rear"):
+        radius = given["wheel_radius"] * getattr(car, f"radius_{axle}")
+        plant[f"radius_{axle}"] = radius
+        plant[f"lever_{axle}"] = radius / given["wheel_inertia"]
+        plant[f"peak_{axle}"] = getattr(car, f"peak_{axle}")
+    plant["initial_slope"] = given["magic_b"] * given["magic_c"]
+    plant["tyre"] = SHAPES[tyre]
     return plant
 
 
@@ -98,10 +140,18 @@ def _wheel_torque(torque, wheel_speed, radius):  # type: ignore[no-untyped-def]
 
 
 @_inline
-def tyre_force(wheel_speed, speed, mu, load, plant):  # type: ignore[no-untyped-def]
+def _share_of_peak(slip, plant):  # type: ignore[no-untyped-def]
+    """Return the tyre force over its peak mu F_z."""
+    if plant.tyre == MAGIC_FORMULA:
+        return magic_formula(slip, plant.magic_b, plant.magic_c, plant.magic_e)
+    normalised = plant.initial_slope * slip
+    return secant(plant.tyre, abs(normalised)) * normalised
+
+
+@_inline
+def tyre_force(wheel_speed, speed, mu, load, radius, plant):  # type: ignore[no-untyped-def]
     """Return the longitudinal tyre force of an axle [N], eq. 4-5."""
-    slip = slip_ratio(plant.wheel_radius * wheel_speed, speed)
-    return mu * load * magic_formula(slip, plant.magic_b, plant.magic_c, plant.magic_e)
+    return mu * load * _share_of_peak(slip_ratio(radius * wheel_speed, speed), plant)
 
 
 @_inline
@@ -125,24 +175,25 @@ def rates(speed, front, rear, force_front, force_rear, gravity, inputs, plant): 
     inputs, plant
         Records of `INPUT_TYPE` and `PLANT_TYPE`.
     """
-    radius = plant.wheel_radius
     speed_rate = (
         (force_front + force_rear - plant.drag * speed * abs(speed)) * plant.per_mass
         - plant.rolling_resistance * GRAVITY * _fade(speed)
         + gravity
     )
-    torque_front = _wheel_torque(inputs.torque_front, front, radius)
-    torque_rear = _wheel_torque(inputs.torque_rear, rear, radius)
-    front_rate = torque_front * plant.per_inertia - force_front * plant.lever
-    rear_rate = torque_rear * plant.per_inertia - force_rear * plant.lever
+    torque_front = _wheel_torque(inputs.torque_front, front, plant.radius_front)
+    torque_rear = _wheel_torque(inputs.torque_rear, rear, plant.radius_rear)
+    front_rate = torque_front * plant.per_inertia - force_front * plant.lever_front
+    rear_rate = torque_rear * plant.per_inertia - force_rear * plant.lever_rear
     return speed_rate, front_rate, rear_rate
 
 
 @_inline
 def state_rates(speed, front, rear, gravity, inputs, plant):  # type: ignore[no-untyped-def]
     """Return the time derivative of the state, eq. 2-5; arguments as for `rates`."""
-    force_front = tyre_force(front, speed, inputs.mu_front, plant.load_front, plant)
-    force_rear = tyre_force(rear, speed, inputs.mu_rear, plant.load_rear, plant)
+    force_front = tyre_force(
+        front, speed, inputs.mu_front, plant.load_front, plant.radius_front, plant
+    )
+    force_rear = tyre_force(rear, speed, inputs.mu_rear, plant.load_rear, plant.radius_rear, plant)
     return rates(speed, front, rear, force_front, force_rear, gravity, inputs, plant)
 
 
@@ -165,20 +216,29 @@ def derivatives(x, inputs, plant, dx):  # type: ignore[no-untyped-def]
 
 
 @_inline
-def _tyre_slopes(wheel_speed, speed, plant):  # type: ignore[no-untyped-def]
+def _tyre_slopes(wheel_speed, speed, radius, plant):  # type: ignore[no-untyped-def]
     """Return an axle's force over its peak, and its slopes to wheel speed and speed."""
-    rolling = plant.wheel_radius * wheel_speed
+    rolling = radius * wheel_speed
     slip = slip_ratio(rolling, speed)
-    share, slope = magic_formula_slope(slip, plant.magic_b, plant.magic_c, plant.magic_e)
+    if plant.tyre == MAGIC_FORMULA:
+        share, slope = magic_formula_slope(slip, plant.magic_b, plant.magic_c, plant.magic_e)
+    else:
+        normalised = plant.initial_slope * slip
+        share = secant(plant.tyre, abs(normalised)) * normalised
+        slope = plant.initial_slope * tangent(plant.tyre, abs(normalised))
     to_rolling, to_speed = slip_ratio_slopes(rolling, speed)
-    return share, slope * to_rolling * plant.wheel_radius, slope * to_speed
+    return share, slope * to_rolling * radius, slope * to_speed
 
 
 @compiled
 def evaluate_tyres(x, plant, tyres):  # type: ignore[no-untyped-def]
     """Write a record of `TYRE_TYPE`: the tyres at a state, whatever the friction."""
-    tyres.front, tyres.front_wheel, tyres.front_speed = _tyre_slopes(x[1], x[0], plant)
-    tyres.rear, tyres.rear_wheel, tyres.rear_speed = _tyre_slopes(x[2], x[0], plant)
+    tyres.front, tyres.front_wheel, tyres.front_speed = _tyre_slopes(
+        x[1], x[0], plant.radius_front, plant
+    )
+    tyres.rear, tyres.rear_wheel, tyres.rear_speed = _tyre_slopes(
+        x[2], x[0], plant.radius_rear, plant
+    )
 
 
 @_inline
@@ -207,17 +267,16 @@ def jacobian(speed, front, rear, inputs, plant, tyres):  # type: ignore[no-untyp
     peak_rear = inputs.mu_rear * plant.load_rear
     front_wheel, front_speed = peak_front * tyres.front_wheel, peak_front * tyres.front_speed
     rear_wheel, rear_speed = peak_rear * tyres.rear_wheel, peak_rear * tyres.rear_speed
-    radius = plant.wheel_radius
     drag_slope = 2.0 * plant.drag * abs(speed)
-    brake_front = _torque_slope(inputs.torque_front, front, radius)
-    brake_rear = _torque_slope(inputs.torque_rear, rear, radius)
+    brake_front = _torque_slope(inputs.torque_front, front, plant.radius_front)
+    brake_rear = _torque_slope(inputs.torque_rear, rear, plant.radius_rear)
     return (
         (front_speed + rear_speed - drag_slope) * plant.per_mass
         - plant.rolling_resistance * GRAVITY * _fade_slope(speed),
         front_wheel * plant.per_mass,
         rear_wheel * plant.per_mass,
-        -front_speed * plant.lever,
-        brake_front * plant.per_inertia - front_wheel * plant.lever,
-        -rear_speed * plant.lever,
-        brake_rear * plant.per_inertia - rear_wheel * plant.lever,
+        -front_speed * plant.lever_front,
+        brake_front * plant.per_inertia - front_wheel * plant.lever_front,
+        -rear_speed * plant.lever_rear,
+        brake_rear * plant.per_inertia - rear_wheel * plant.lever_rear,
     )

@@ -36,10 +36,11 @@ from gripbench.envs.plants.longitudinal.plant import (
     rates,
 )
 from gripbench.envs.plants.simulation import Action, Lanes, Simulation
+from gripbench.envs.roads.road import SPACING, smooth_noise
 from gripbench.envs.scenarios import Scenario
 from gripbench.envs.signals import record_type
 from gripbench.envs.tyres.longitudinal import slip_ratio
-from gripbench.envs.vehicles import Vehicle
+from gripbench.envs.vehicles import CarOnRoad, Vehicle, on_road
 from gripbench.errors import GripbenchError
 
 PAPER_SOLVER = "paper"
@@ -51,15 +52,26 @@ _MOST_STEPS = 1_000_000
 """Steps of the paper's solver at most: a drive of the paper takes up to 28 000."""
 
 _FULL_TORQUE = 5000.0
+_LONGEST_ROAD = 2000.0  # of a rough road [m]
 _FIRST_STEP = 1e-5  # of the integrator [s]; it then chooses its own
 NOISE_BLOCK = 1024  # process noise is drawn ahead in blocks; the stream is the same for any size
 
 
 class TorqueDriver(Configuration):
-    """Torque [N m] on each axle over time; the rear axle follows the front unless given."""
+    """Torque [N m] on each axle over time; the rear axle follows the front unless given.
+
+    Attributes
+    ----------
+    front, rear
+        Torque profiles.
+    slip_limit
+        Slip ratio from which torque is reduced (traction control, anti-lock brakes), gone at twice
+        of it; 0: never.
+    """
 
     front: tuple[Segment, ...]
     rear: tuple[Segment, ...] | None = None
+    slip_limit: float = Field(default=0.0, ge=0.0, le=0.5)
 
     @field_validator("front", "rear")
     @classmethod
@@ -80,8 +92,17 @@ class LongitudinalScenario(Scenario):
         Speed at the start [m/s]; the wheels roll without slip.
     road_grade
         Inclination [rad], positive downhill.
+    grade_std
+        Standard deviation [rad] of smooth noise on it along the road.
     friction
         Friction coefficient over time, both axles.
+    mu_std
+        Standard deviation of smooth noise on its logarithm along the road.
+    correlation_length
+        Of the noise [m].
+    tyre
+        Shape of the tyres' force curve, see `gripbench.envs.tyres.combined`; the Magic Formula is
+        the vehicle's own.
     wheel_speed_noise
         Process noise: relative standard deviation of the wheel speeds' jumps after each
         millisecond; 0 in the paper's solver, whose own error takes its place.
@@ -93,7 +114,11 @@ class LongitudinalScenario(Scenario):
     integrator: Literal["ros3", "rk4", "paper"] = "ros3"
     initial_speed: float = Field(default=1.0, ge=0.0, le=100.0)
     road_grade: float = Field(default=0.0, ge=-0.5, le=0.5)
+    grade_std: float = Field(default=0.0, ge=0.0, le=0.2)
     friction: tuple[Segment, ...] = Field(min_length=1)
+    mu_std: float = Field(default=0.0, ge=0.0, le=0.5)
+    correlation_length: float = Field(default=40.0, ge=1.0)
+    tyre: Literal["brush", "dugoff", "magic_formula", "fitted_curve"] = "magic_formula"
     wheel_speed_noise: float = Field(default=0.0, ge=0.0, le=0.1)
     driver: TorqueDriver
 
@@ -114,7 +139,30 @@ class LongitudinalScenario(Scenario):
             raise ValueError(f"friction ends at {covered:g} s, before the horizon")
         if self.integrator == PAPER_SOLVER and self.wheel_speed_noise > 0.0:
             raise ValueError("wheel_speed_noise has no meaning with the paper's solver")
+        if self.integrator == PAPER_SOLVER and (self.driver.slip_limit or self.rough):
+            raise ValueError(
+                "mu_std, grade_std and driver.slip_limit need samples: set integrator = 'ros3'"
+            )
         return self
+
+    @property
+    def rough(self) -> bool:
+        """Whether friction or grade change along the road."""
+        return self.mu_std > 0.0 or self.grade_std > 0.0
+
+    def lay_road(self, seed: int) -> npt.NDArray[np.float64]:
+        """Return friction over that of the profile and grade [rad] on top of `road_grade`.
+
+        Shape (n, 2), every `SPACING` metres; beyond the end the last values hold.
+        """
+        if not self.rough:
+            return np.array([[1.0, 0.0], [1.0, 0.0]])
+        points = int(_LONGEST_ROAD / SPACING)
+        road = np.empty((points, 2))
+        length = self.correlation_length
+        road[:, 0] = np.exp(self.mu_std * smooth_noise(length, points, seed, "mu"))
+        road[:, 1] = self.grade_std * smooth_noise(length, points, seed, "grade")
+        return road
 
 
 TRUTH_TYPE = record_type(
@@ -153,8 +201,8 @@ def _write_truth(time, x, inputs, plant, tyres, truth):  # type: ignore[no-untyp
     truth.speed_x = x[0]
     truth.wheel_speed_front = x[1]
     truth.wheel_speed_rear = x[2]
-    truth.slip_ratio_front = slip_ratio(plant.wheel_radius * x[1], x[0])
-    truth.slip_ratio_rear = slip_ratio(plant.wheel_radius * x[2], x[0])
+    truth.slip_ratio_front = slip_ratio(plant.radius_front * x[1], x[0])
+    truth.slip_ratio_rear = slip_ratio(plant.radius_rear * x[2], x[0])
     truth.force_x_front = force_front
     truth.force_x_rear = force_rear
     truth.mu_front = inputs.mu_front
@@ -175,44 +223,94 @@ def advance_one(  # type: ignore[no-untyped-def]
     k, sample_time, x, step, inputs, plant, integrator, jumps, tyres, work, truth
 ):
     """Advance from sample `k` to the next; `jumps` are the wheel speeds' relative jumps at it."""
+    before = x[0]
     step = integrators.integrate(x, step, sample_time, inputs, plant, integrator, tyres, work)
     x[1] *= 1.0 + jumps[0]
     x[2] *= 1.0 + jumps[1]
+    inputs.distance += 0.5 * (before + x[0]) * sample_time
     evaluate_tyres(x, plant, tyres)
     _write_truth((k + 1) * sample_time, x, inputs, plant, tyres, truth)
     return step
 
 
 @compiled
-def command(k, sample_time, front, rear, friction, grade, inputs):  # type: ignore[no-untyped-def]
-    """Write what acts from sample `k` to the next: the profiles at the middle of the interval.
+def feel_road(inputs, road, grade, plant):  # type: ignore[no-untyped-def]
+    """Apply what the place on the road and the tyres make of the friction profile; write grade.
+
+    Parameters
+    ----------
+    inputs
+        Record of `INPUT_TYPE` with the friction of the profile and the distance.
+    road
+        Friction over that of the profile and grade [rad] along the road, shape (n, 2).
+    grade
+        Road grade on which that comes on top [rad].
+    plant
+        Record of `PLANT_TYPE`.
+    """
+    place = min(max(inputs.distance / SPACING, 0.0), road.shape[0] - 1.000001)
+    first = int(place)
+    part = place - first
+    surface = road[first, 0] + part * (road[first + 1, 0] - road[first, 0])
+    inputs.mu_front = inputs.mu_front * surface * plant.peak_front
+    inputs.mu_rear = inputs.mu_rear * surface * plant.peak_rear
+    inputs.road_grade = grade + (road[first, 1] + part * (road[first + 1, 1] - road[first, 1]))
+
+
+@compiled
+def limited(torque, wheel_speed, speed, radius, slip_limit):  # type: ignore[no-untyped-def]
+    """Return what traction control and anti-lock brakes leave of a torque [N m]."""
+    if slip_limit <= 0.0:
+        return torque
+    slip = slip_ratio(radius * wheel_speed, speed)
+    if torque < 0.0:
+        slip = -slip
+    return torque * min(max(2.0 - slip / slip_limit, 0.0), 1.0)
+
+
+@compiled
+def command(k, sample_time, friction, grade, road, plant, inputs):  # type: ignore[no-untyped-def]
+    """Write the road that acts from sample `k` to the next: the profile at the interval's middle.
 
     A held mean is exact for a constant and second-order accurate for a slope; a jump of a profile
     that lies on a sample is met exactly.
     """
-    set_inputs(inputs, (k + 0.5) * sample_time, front, rear, friction, grade)
+    mu = profile_value((k + 0.5) * sample_time, friction)
+    inputs.mu_front = mu
+    inputs.mu_rear = mu
+    feel_road(inputs, road, grade, plant)
+
+
+@compiled
+def decide(k, sample_time, x, front, rear, slip_limit, plant, torques):  # type: ignore[no-untyped-def]
+    """Write the driver's axle torques from sample `k` to the next [N m], shape (2,)."""
+    middle = (k + 0.5) * sample_time
+    for i, profile, radius in ((0, front, plant.radius_front), (1, rear, plant.radius_rear)):
+        torques[i] = limited(profile_value(middle, profile), x[1 + i], x[0], radius, slip_limit)
 
 
 @compiled
 def _run(  # type: ignore[no-untyped-def]
-    sample_time, x, step, inputs, plant, integrator, profiles, jumps, tyres, work, truth
-):
-    """Run to the end; `inputs` holds the road grade, the profiles give all else."""
+    sample_time, x, step, inputs, plant, integrator, profiles, grade, road, slip_limit, jumps,
+    tyres, work, truth,
+):  # fmt: skip
+    """Run to the end: the bytes of `decide`, `command` and `advance_one`, sample by sample."""
     count = truth.shape[0] - 1
     middles = (np.arange(count) + 0.5) * sample_time
     front = profile_values(middles, profiles[0])
     rear = profile_values(middles, profiles[1])
     friction = profile_values(middles, profiles[2])
     now = inputs[0]
+    car = plant[0]
     for k in range(count):
-        now.torque_front = front[k]
-        now.torque_rear = rear[k]
+        now.torque_front = limited(front[k], x[1], x[0], car.radius_front, slip_limit)
+        now.torque_rear = limited(rear[k], x[2], x[0], car.radius_rear, slip_limit)
         now.mu_front = friction[k]
         now.mu_rear = friction[k]
+        feel_road(now, road, grade, car)
         step = advance_one(
-            k, sample_time, x, step, now, plant[0], integrator, jumps[k], tyres[0], work,
-            truth[k + 1],
-        )  # fmt: skip
+            k, sample_time, x, step, now, car, integrator, jumps[k], tyres[0], work, truth[k + 1]
+        )
 
 
 @compiled
@@ -244,12 +342,13 @@ class LongitudinalSimulation(Simulation):
     )
     truth_type = TRUTH_TYPE
 
-    def __init__(self, scenario: LongitudinalScenario, vehicle: Vehicle) -> None:
+    def __init__(self, scenario: LongitudinalScenario, vehicle: Vehicle | CarOnRoad) -> None:
         self.scenario = scenario
+        self._road = scenario.lay_road(0)
         paper = scenario.integrator == PAPER_SOLVER
         self.sample_time = None if paper else scenario.sample_time
         self._integrator = -1 if paper else integrators.INTEGRATORS[scenario.integrator]
-        self._plant = plant_record(vehicle.values())
+        self._plant = plant_record(on_road(vehicle), scenario.tyre)
         driver = scenario.driver
         rear = driver.front if driver.rear is None else driver.rear
         self._segments = (driver.front, rear, scenario.friction)
@@ -269,6 +368,7 @@ class LongitudinalSimulation(Simulation):
             )
         self._start()
         self._jumps = _jump_stream(seed)
+        self._road = self.scenario.lay_road(seed)
         self._pending = np.empty((0, 2))
         truth = np.zeros(1, TRUTH_TYPE)
         self._set_start_inputs()
@@ -280,15 +380,20 @@ class LongitudinalSimulation(Simulation):
     def drive(self) -> npt.NDArray[np.float64]:
         """Return the torques of the scenario's profiles for the next interval [N m]."""
         front, rear, _ = self._profiles
-        middle = (self._k + 0.5) * self.scenario.sample_time
-        return np.array([profile_value(middle, front), profile_value(middle, rear)])
+        torques = np.empty(2)
+        decide(
+            self._k, self.scenario.sample_time, self._x, front, rear,
+            self.scenario.driver.slip_limit, self._plant[0], torques,
+        )  # fmt: skip
+        return torques
 
     def advance(self, action: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
         """Hold the axle torques [N m] for one sample time; return the sample at its end."""
         sample_time = self.scenario.sample_time
-        front, rear, friction = self._profiles
+        friction = self._profiles[2]
         inputs = self._inputs[0]
-        command(self._k, sample_time, front, rear, friction, self.scenario.road_grade, inputs)
+        plant = self._plant[0]
+        command(self._k, sample_time, friction, self.scenario.road_grade, self._road, plant, inputs)
         inputs["torque_front"], inputs["torque_rear"] = action
         if len(self._pending) == 0:
             self._pending = self._draw(NOISE_BLOCK)
@@ -299,7 +404,7 @@ class LongitudinalSimulation(Simulation):
             self._x,
             self._step,
             inputs,
-            self._plant[0],
+            plant,
             self._integrator,
             self._pending[0],
             self._tyres[0],
@@ -327,6 +432,9 @@ class LongitudinalSimulation(Simulation):
             self._plant,
             self._integrator,
             self._profiles,
+            self.scenario.road_grade,
+            self._road,
+            self.scenario.driver.slip_limit,
             self._draw(self.scenario.steps),
             self._tyres,
             self._work,
@@ -352,7 +460,8 @@ class LongitudinalSimulation(Simulation):
 
     def _start(self) -> None:
         speed = self.scenario.initial_speed
-        self._x = np.array([speed, *[speed / self._plant["wheel_radius"][0]] * 2])
+        radii = [self._plant[f"radius_{axle}"][0] for axle in ("front", "rear")]
+        self._x = np.array([speed, *(speed / radius for radius in radii)])
         self._step = _FIRST_STEP
         self._k = 0
         self.termination = ""
@@ -362,6 +471,8 @@ class LongitudinalSimulation(Simulation):
         _, _, friction = self._profiles
         nothing = friction[:0]
         set_inputs(self._inputs[0], 0.0, nothing, nothing, friction, self.scenario.road_grade)
+        self._inputs["distance"] = 0.0
+        feel_road(self._inputs[0], self._road, self.scenario.road_grade, self._plant[0])
 
     def _draw(self, n: int) -> npt.NDArray[np.float64]:
         deviation = self.scenario.wheel_speed_noise * np.sqrt(self.scenario.sample_time / 1e-3)

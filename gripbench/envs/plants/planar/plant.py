@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gripbench.envs.tyres.combined import SHAPES, combined_force
-from gripbench.envs.vehicles import GRAVITY, Vehicle, require
+from gripbench.envs.vehicles import GRAVITY, CarOnRoad, Vehicle, on_road, require
 from gripbench.errors import InputError
 
 V_X, V_Y, YAW_RATE, WHEEL, ROLL, ROLL_RATE, LAGGED_X, LAGGED_Y = 0, 1, 2, 3, 7, 8, 9, 10
@@ -65,6 +65,10 @@ PLANT = np.dtype(
             "track_front",
             "track_rear",
             "wheel_radius",
+            "radius_front",  # of the axle's own tyres
+            "radius_rear",
+            "peak_front",  # friction that the axle's tyres find over the road's
+            "peak_rear",
             "spin_inertia",  # of one wheel
             "drag",
             "rolling_resistance",
@@ -117,7 +121,7 @@ PARAMETERS = (
 """Vehicle parameters that the planar plant needs."""
 
 
-def plant_record(tyre: str, vehicle: Vehicle) -> npt.NDArray[np.void]:
+def plant_record(tyre: str, vehicle: Vehicle | CarOnRoad) -> npt.NDArray[np.void]:
     """Return what the compiled plant needs of a vehicle, one record of `PLANT`.
 
     Parameters
@@ -125,17 +129,21 @@ def plant_record(tyre: str, vehicle: Vehicle) -> npt.NDArray[np.void]:
     tyre
         Name of the tyre's shape, a key of `SHAPES`.
     vehicle
-        Vehicle with every parameter of `PARAMETERS`.
+        The car on the road, with every parameter of `PARAMETERS`.
 
     Raises
     ------
     InputError
         If the vehicle lacks a parameter, or its wheels are too light for the step.
     """
-    given = require(vehicle.values(), PARAMETERS, "the planar plant")
+    car = on_road(vehicle)
+    given = require(car.values(), PARAMETERS, "the planar plant")
     record = np.zeros(1, PLANT)
     for name in set(PLANT.names or ()) & set(given):
         record[name] = given[name]
+    for axle in ("front", "rear"):
+        record[f"radius_{axle}"] = given["wheel_radius"] * getattr(car, f"radius_{axle}")
+        record[f"peak_{axle}"] = getattr(car, f"peak_{axle}")
     mass, height = given["mass"], given["cg_height"]
     base = given["cg_to_front"] + given["cg_to_rear"]
     share = given["roll_share_front"]
@@ -192,12 +200,14 @@ def wheel_forces(x, u, p, wheels):  # type: ignore[no-untyped-def]
             offset_x = p.cg_to_front
             offset_y = 0.5 * p.track_front
             stiffness = p.tyre_y_front
+            radius = p.radius_front
         else:
             axle = u[NORMAL] * p.mass_rear + transfer
             aside = x[LAGGED_Y] * p.transfer_rear
             offset_x = -p.cg_to_rear
             offset_y = 0.5 * p.track_rear
             stiffness = p.tyre_y_rear
+            radius = p.radius_rear
         if i % 2 == 1:
             aside = -aside
             offset_y = -offset_y
@@ -211,7 +221,7 @@ def wheel_forces(x, u, p, wheels):  # type: ignore[no-untyped-def]
             speed_y = cos_steer * speed_y - sin_steer * speed_x
             speed_x = turned
         spin = x[WHEEL + i]
-        rolling = p.wheel_radius * spin
+        rolling = radius * spin
         inverse = 1.0 / rolling_speed(rolling)
         force_x, force_y = combined_force(
             p.shape,
@@ -289,7 +299,8 @@ def derivative(x, u, p, wheels, dx):  # type: ignore[no-untyped-def]
     dx[V_Y] = specific_y + u[GRAVITY_Y] - x[YAW_RATE] * x[V_X]
     dx[YAW_RATE] = moment * p.inverse_yaw_inertia
     for i in range(4):
-        braking = p.wheel_radius * (wheels[i, FORCE_X] + wheels[i, RESISTANCE])
+        radius = p.radius_front if i < 2 else p.radius_rear
+        braking = radius * (wheels[i, FORCE_X] + wheels[i, RESISTANCE])
         dx[WHEEL + i] = (wheels[i, APPLIED_TORQUE] - braking) * p.inverse_spin_inertia
     dx[ROLL] = x[ROLL_RATE]
     dx[ROLL_RATE] = p.roll_frequency * (

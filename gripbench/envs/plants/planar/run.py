@@ -37,7 +37,7 @@ class Run(NamedTuple):
     planned
         Open-loop steering angle [rad] and speed to hold [m/s] at each sample, shape (n, 2).
     profile
-        Bank and grade of the road [rad] over the distance, shape (m, 2).
+        Bank, grade [rad] and friction over `mu` of the road over the distance, shape (m, 3).
     path
         Table of the path, shape (l, 4); no rows for open-loop steering.
     disturbance
@@ -101,7 +101,7 @@ def begin(run, speed, truth, columns):  # type: ignore[no-untyped-def]
     x, u, p = run.state, run.inputs, run.plant[0]
     x[plant.V_X] = speed
     for i in range(4):
-        x[plant.WHEEL + i] = speed / p.wheel_radius
+        x[plant.WHEEL + i] = speed / (p.radius_front if i < 2 else p.radius_rear)
     feel_road(x, p, run.friction[0], run.profile, u)
     # The body has settled on a banked or inclined road: the tyres carry its weight's share.
     x[plant.LAGGED_X] = -u[plant.GRAVITY_X]

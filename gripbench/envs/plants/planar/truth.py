@@ -163,7 +163,8 @@ def _write_wheels(x, u, p, wheels, row, columns):  # type: ignore[no-untyped-def
     available = 0.0
     used = 0.0
     for i in range(4):
-        rolling = p.wheel_radius * x[plant.WHEEL + i]
+        radius = p.radius_front if i < 2 else p.radius_rear
+        rolling = radius * x[plant.WHEEL + i]
         speed_x = wheels[i, plant.LON_SPEED]
         force = math.hypot(wheels[i, plant.FORCE_X], wheels[i, plant.FORCE_Y])
         load = wheels[i, plant.LOAD]

@@ -25,7 +25,7 @@ from gripbench.envs.plants.planar.run import (
 from gripbench.envs.plants.planar.truth import TRUTH
 from gripbench.envs.plants.simulation import Action, Simulation
 from gripbench.envs.roads.road import MagneticField, disturb_field, lay_road, stream
-from gripbench.envs.vehicles import Vehicle
+from gripbench.envs.vehicles import CarOnRoad, Vehicle
 from gripbench.errors import InputError
 
 WHEELS = ("front_left", "front_right", "rear_left", "rear_right")
@@ -47,7 +47,7 @@ class PlanarScenario(DrivenScenario):
     """
 
     world: Literal["planar"]
-    tyre: Literal["brush", "dugoff", "magic_formula"] = "brush"
+    tyre: Literal["brush", "dugoff", "magic_formula", "fitted_curve"] = "brush"
     magnetic: MagneticField = MagneticField()
     stop_speed: float = Field(default=0.05, ge=0.0)
 
@@ -83,7 +83,7 @@ class PlanarSimulation(Simulation):
     )
     truth_type: ClassVar[np.dtype[Any]] = TRUTH
 
-    def __init__(self, scenario: PlanarScenario, vehicle: Vehicle) -> None:
+    def __init__(self, scenario: PlanarScenario, vehicle: Vehicle | CarOnRoad) -> None:
         self._scenario = scenario
         self._vehicle = vehicle
         self.sample_time = scenario.sample_time
@@ -126,9 +126,15 @@ class PlanarSimulation(Simulation):
         count, code = roll_out(self._run, self._parts, samples, columns)
         self.termination = TERMINATIONS[code]
         truth = samples[:count]
-        jumped = np.flatnonzero(truth["mu"] != truth["mu"][0])
-        if self._scenario.road.mu_after > 0.0 and len(jumped):
-            self._jump_time = float(truth["time"][jumped[0]])
+        road = self._scenario.road
+        if road.mu_after > 0.0:
+            if road.mu_std > 0.0 or road.surfaces:  # the friction changes all the time
+                travelled = np.cumsum(truth["speed_x"]) * self._scenario.sample_time
+                jumped = np.flatnonzero(travelled >= road.mu_jump_at)
+            else:
+                jumped = np.flatnonzero(truth["mu"] != truth["mu"][0])
+            if len(jumped):
+                self._jump_time = float(truth["time"][jumped[0]])
         return truth
 
     def fresh(self) -> PlanarSimulation:

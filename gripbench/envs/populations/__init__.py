@@ -1,0 +1,1 @@
+"""Populations: the cars, roads, drives and instruments from which a seed draws."""

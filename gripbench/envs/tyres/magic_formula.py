@@ -1,0 +1,28 @@
+"""Magic Formula tyre of one shape: from the normalised slip s, secant slope f(s)/s and slope f'(s).
+
+f(s) = sin(C atan(s / C)) with C = 1.3 (Pacejka, Tire and Vehicle Dynamics, section 4.3, E = 0).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numba
+
+MAGIC_SHAPE = 1.3
+"""Shape factor C."""
+
+
+@numba.njit(inline="always", error_model="numpy")
+def secant(s):  # type: ignore[no-untyped-def]
+    """Return f(s) / s for s >= 0."""
+    if s < 1e-6:
+        return 1.0
+    return math.sin(MAGIC_SHAPE * math.atan(s / MAGIC_SHAPE)) / s
+
+
+@numba.njit(inline="always", error_model="numpy")
+def tangent(s):  # type: ignore[no-untyped-def]
+    """Return f'(s) for s >= 0."""
+    inner = s / MAGIC_SHAPE
+    return math.cos(MAGIC_SHAPE * math.atan(inner)) / (1.0 + inner * inner)
