@@ -193,6 +193,10 @@ class DrawnSimulation(Simulation):
         """Return facts of the run that a score may need, by name."""
         return self._inner.notes()
 
+    def path(self) -> npt.NDArray[np.float64]:
+        """Return the path of the run."""
+        return self._inner.path()
+
     @classmethod
     def together(cls, simulations: Sequence[Any]) -> Lanes:
         """Return runs that advance one after the other: no two have the same car."""

@@ -90,6 +90,7 @@ class VehicleEnvironment(gymnasium.Env[Observation, npt.NDArray[np.float64]]):
     ) -> None:
         self._episodes = Episodes(scenario, idealised)
         self.scenario = self._episodes.scenario
+        self.vehicle = self._episodes.vehicle
         self.simulation: Simulation = self._episodes.simulation()
         self._own_simulation = self.simulation
         self.observation_space: spaces.Space[Any] = observation_space(self._episodes.channels)

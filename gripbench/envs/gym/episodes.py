@@ -13,7 +13,8 @@ from gripbench.envs.instruments.sensors import SensorSuite
 from gripbench.envs.plants.simulation import Simulation
 from gripbench.envs.scenarios import Scenario
 from gripbench.envs.signals import NEW, signal
-from gripbench.envs.worlds import load_scenario, simulation_of
+from gripbench.envs.populations.draws import paper_of
+from gripbench.envs.worlds import load_scenario, sensors_of, simulation_of
 
 _LARGEST = {
     "s": 1e5,
@@ -57,12 +58,15 @@ class Episodes:
     ----------
     scenario
         The scenario.
+    vehicle
+        The car on paper, which is all that a method may know of it.
     channels
         What an observation holds, in order.
     """
 
     def __init__(self, scenario: str, idealised: bool) -> None:
         self.scenario = load_scenario(scenario)
+        self.vehicle = paper_of(self.scenario)
         self._sensors = self.scenario.all_sensors()
         names = self.suite(self.simulation(), 0).observation_type.names or ()
         self.channels = tuple(
@@ -79,7 +83,8 @@ class Episodes:
 
     def suite(self, simulation: Simulation, seed: int) -> SensorSuite:
         """Return the sensors of the episode with a seed; they have not measured yet."""
-        return SensorSuite(self._sensors, simulation.truth_type, simulation.sample_time, seed)
+        sensors = sensors_of(self.scenario, seed) if self.scenario.level else self._sensors
+        return SensorSuite(sensors, simulation.truth_type, simulation.sample_time, seed)
 
     def observation(
         self, observed: npt.NDArray[Any] | np.void

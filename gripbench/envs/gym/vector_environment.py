@@ -73,6 +73,7 @@ class VehicleVectorEnvironment(VectorEnv[Observations, npt.NDArray[np.float64], 
         self._mode = _autoreset_mode(autoreset_mode)
         self._episodes = Episodes(scenario, idealised)
         self.scenario = self._episodes.scenario
+        self.vehicle = self._episodes.vehicle
         self._own = [self._episodes.simulation() for _ in range(self.num_envs)]
         self._changed = np.zeros(self.num_envs, bool)
         one = self._own[0]

@@ -161,9 +161,7 @@ def _advance_lanes(  # type: ignore[no-untyped-def]
 ):
     for lane in lanes:
         now = inputs[lane]
-        command(
-            k[lane], sample_time, friction[lane], grades[lane], roads[lane], plants[lane], now
-        )
+        command(k[lane], sample_time, friction[lane], grades[lane], roads[lane], plants[lane], now)
         now.torque_front = actions[lane, 0]
         now.torque_rear = actions[lane, 1]
         steps[lane] = advance_one(
