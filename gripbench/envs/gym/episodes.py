@@ -11,9 +11,9 @@ from gymnasium import spaces
 from gripbench.envs.gym.arguments import scenario_with
 from gripbench.envs.instruments.sensors import SensorSuite
 from gripbench.envs.plants.simulation import Simulation
+from gripbench.envs.populations.draws import paper_of
 from gripbench.envs.scenarios import Scenario
 from gripbench.envs.signals import NEW, signal
-from gripbench.envs.populations.draws import paper_of
 from gripbench.envs.worlds import load_scenario, sensors_of, simulation_of
 
 _LARGEST = {
