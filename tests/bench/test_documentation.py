@@ -22,6 +22,7 @@ PAGES = (
     "docs/figures.md",
     "docs/ranking.md",
     "docs/api.md",
+    "docs/environments.md",
 )
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 FILE = re.compile(r"# (\S+\.(?:py|toml))\n")

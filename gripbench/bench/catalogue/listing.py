@@ -4,6 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from gripbench.bench.catalogue.environments import (
+    NAMESPACE,
+    environment_lines,
+    environment_settings,
+)
 from gripbench.bench.catalogue.registry import (
     all_scenario_files,
     built_in_methods,
@@ -44,6 +49,8 @@ def settings(name: str) -> dict[str, Any]:
         return {"kind": "suite", **load_suite(name).model_dump(mode="json")}
     if name in vehicle_files():
         return {"kind": "vehicle", **_vehicle(name)}
+    if name.startswith(NAMESPACE):
+        return {"kind": "environment", **environment_settings(name)}
     if name in SIGNALS:
         return {"kind": "signal", **vars(signal(name))}
     if ".py" in name or name.partition(":")[0].partition("@")[0] in method_names():
@@ -197,4 +204,5 @@ _LISTS = {
     "vehicles": _vehicle_lines,
     "signals": _signal_lines,
     "suites": _suite_lines,
+    "environments": environment_lines,
 }

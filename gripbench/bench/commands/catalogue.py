@@ -17,6 +17,7 @@ class Kind(StrEnum):
     VEHICLES = "vehicles"
     SIGNALS = "signals"
     SUITES = "suites"
+    ENVIRONMENTS = "environments"
 
 
 def register(app: typer.Typer) -> None:
@@ -34,7 +35,7 @@ def _methods() -> None:
 
 
 def list_kind(kind: Annotated[Kind, typer.Argument(help="What to list.")]) -> None:
-    """List scenarios, methods, vehicles, signals or suites."""
+    """List scenarios, methods, vehicles, signals, suites or environments."""
     from rich.table import Table
 
     from gripbench.bench.catalogue.listing import listing
