@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from gripbench.bench.catalogue.environments import (
@@ -20,6 +21,17 @@ from gripbench.bench.catalogue.registry import (
 )
 from gripbench.bench.ranking.summary import MARK, marked
 from gripbench.bench.running.recorded_scenarios import PREFIX
+from gripbench.configuration import read_toml
+from gripbench.envs.instruments.sensors import Sensor
+from gripbench.envs.populations.causes import CAUSES, SHAPES_OF_TYRES
+from gripbench.envs.populations.draws import sensors_at
+from gripbench.envs.populations.grades import grade_files, load_grade
+from gripbench.envs.populations.population import (
+    TABLES,
+    Population,
+    load_population,
+    population_files,
+)
 from gripbench.envs.signals import SIGNALS, signal
 from gripbench.envs.vehicles import VEHICLE_PARAMETERS, load_vehicle, vehicle_files
 from gripbench.errors import InputError, unknown
@@ -41,9 +53,14 @@ def settings(name: str) -> dict[str, Any]:
     InputError
         If nothing has this name; the message names the nearest one.
     """
-    if name in all_scenario_files() or name.endswith(".toml") or name.startswith(PREFIX):
+    if name in population_files() or _is_population(name):
+        return {"kind": "population", **load_population(name).model_dump(mode="json")}
+    if name in grade_files():
+        return {"kind": "instruments", **load_grade(name).model_dump(mode="json")}  # type: ignore[union-attr]
+    place = name if name.startswith(PREFIX) else name.rpartition("@")[0] or name
+    if place in all_scenario_files() or place.endswith(".toml") or name.startswith(PREFIX):
         scenario = find_scenario(name)
-        sensors = {key: item.model_dump() for key, item in scenario.all_sensors().items()}
+        sensors = {key: item.model_dump() for key, item in sensors_at(scenario).items()}
         return {"kind": "scenario", **scenario.model_dump(mode="json"), "sensors": sensors}
     if name in suite_files():
         return {"kind": "suite", **load_suite(name).model_dump(mode="json")}
@@ -55,8 +72,19 @@ def settings(name: str) -> dict[str, Any]:
         return {"kind": "signal", **vars(signal(name))}
     if ".py" in name or name.partition(":")[0].partition("@")[0] in method_names():
         return {"kind": "method", **_method(name)}
-    known = [*all_scenario_files(), *method_names(), *suite_files(), *vehicle_files(), *SIGNALS]
+    known = [
+        *all_scenario_files(), *method_names(), *suite_files(), *vehicle_files(), *SIGNALS,
+        *population_files(), *grade_files(),
+    ]  # fmt: skip
     raise unknown("name", name, known)
+
+
+def _is_population(name: str) -> bool:
+    """Tell whether a TOML file holds a population and no scenario."""
+    if not name.endswith(".toml"):
+        return False
+    content = read_toml(Path(name))
+    return "world" not in content and bool({"friction_prior", "effects", *TABLES} & set(content))
 
 
 def sensor_needs(target: str = "", everything: bool = False) -> tuple[tuple[str, ...], Lines]:
@@ -198,7 +226,66 @@ def _suite_lines() -> tuple[tuple[str, ...], Lines]:
     return ("suite", "scenarios x methods x seeds", "description"), lines
 
 
+def _population_lines() -> tuple[tuple[str, ...], Lines]:
+    lines: Lines = []
+    for name in population_files():
+        population = load_population(name)
+        guesses = sum(spread.guess for spread in population.spreads.values())
+        size = f"{len(population.spreads)} ({guesses} guesses)"
+        lines.append((name, size, population.description))
+    return ("population", "causes", "description"), lines
+
+
+def _cause_lines() -> tuple[tuple[str, ...], Lines]:
+    populations = [load_population(name) for name in population_files()]
+    lines: Lines = [
+        (
+            cause.name,
+            cause.unit,
+            *(spread_text(population, cause.name) for population in populations),
+            cause.description,
+        )
+        for cause in CAUSES.values()
+    ]
+    names = [f"{population.name}, level 1" for population in populations]
+    return ("cause", "unit", *names, "description"), lines
+
+
+def spread_text(population: Population, cause: str) -> str:
+    """Return the spread of a cause at level 1 in words; `?` marks a guess, empty: none."""
+    if cause == SHAPES_OF_TYRES:
+        chosen = population.shape
+        if chosen is None:
+            return ""
+        shares = ", ".join(f"{name} {share:g}" for name, share in chosen.shares.items() if share)
+        return shares + (" ?" if chosen.guess else "")
+    spread = population.spreads.get(cause)
+    if spread is None:
+        return ""
+    if spread.std > 0.0:
+        text = f"sd {spread.std:g}"
+    else:
+        text = f"{spread.centre + spread.low:g} to {spread.centre + spread.high:g}"
+    return text + (" ?" if spread.guess else "")
+
+
+def _instrument_lines() -> tuple[tuple[str, ...], Lines]:
+    lines: Lines = []
+    for name in grade_files():
+        grade = load_grade(name)
+        assert grade is not None
+        nothing = Sensor().model_dump()
+        for channel, sensor in grade.sensors.items():
+            given = sensor.model_dump()
+            said = [f"{key} {given[key]}" for key in given if given[key] != nothing[key]]
+            lines.append((name, channel, signal(channel).unit, ", ".join(said)))
+    return ("grade", "channel", "unit", "errors and sampling"), lines
+
+
 _LISTS = {
+    "populations": _population_lines,
+    "causes": _cause_lines,
+    "instruments": _instrument_lines,
     "scenarios": _scenario_lines,
     "methods": _method_lines,
     "vehicles": _vehicle_lines,

@@ -18,6 +18,9 @@ class Kind(StrEnum):
     SIGNALS = "signals"
     SUITES = "suites"
     ENVIRONMENTS = "environments"
+    POPULATIONS = "populations"
+    CAUSES = "causes"
+    INSTRUMENTS = "instruments"
 
 
 def register(app: typer.Typer) -> None:
@@ -35,7 +38,7 @@ def _methods() -> None:
 
 
 def list_kind(kind: Annotated[Kind, typer.Argument(help="What to list.")]) -> None:
-    """List scenarios, methods, vehicles, signals, suites or environments."""
+    """List scenarios, methods, vehicles, populations, causes, instruments..."""
     from rich.table import Table
 
     from gripbench.bench.catalogue.listing import listing

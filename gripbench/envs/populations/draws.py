@@ -197,6 +197,13 @@ def drawn_from(scenario: Scenario) -> dict[str, Any]:
     }
 
 
+def sensors_at(scenario: Scenario) -> dict[str, Sensor]:
+    """Return the instruments of a scenario, those of its level's grade where it has a level."""
+    if not scenario.level:
+        return scenario.all_sensors()
+    return graded_sensors(scenario, load_population(scenario.population))
+
+
 def graded_sensors(scenario: Scenario, population: Population) -> dict[str, Sensor]:
     """Return the instruments of a scenario's level, before a car's own errors come on top."""
     from gripbench.envs.worlds import WORLDS
