@@ -11,7 +11,7 @@ import ast
 import hashlib
 import importlib.metadata
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -70,6 +70,19 @@ def source_digest(*files: Path) -> str:
     *files
         Python files.
     """
+    paths, packages = _followed(files)
+    lines = [f"{_relative(path)} {content}" for path, content in paths.items()]
+    lines += [f"{name} {_version(name)}" for name in packages]
+    return digest(*sorted(lines))
+
+
+def source_files(*files: Path) -> set[Path]:
+    """Return source files with all those of their project that they import by name."""
+    return set(_followed(files)[0])
+
+
+def _followed(files: Iterable[Path]) -> tuple[dict[Path, str], set[str]]:
+    """Return the digests of files and of all that they import, and the packages beside them."""
     paths: dict[Path, str] = {}
     packages: set[str] = set()
     waiting = [path.resolve() for path in files]
@@ -81,9 +94,7 @@ def source_digest(*files: Path) -> str:
         own, foreign = _imports(path, paths[path])
         waiting.extend(own)
         packages |= foreign
-    lines = [f"{_relative(path)} {content}" for path, content in paths.items()]
-    lines += [f"{name} {_version(name)}" for name in packages]
-    return digest(*sorted(lines))
+    return paths, packages
 
 
 def _relative(path: Path) -> str:

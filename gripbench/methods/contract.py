@@ -86,6 +86,8 @@ class CompiledMethod:
         What differs in each variant, by name: a `Variant`, or only its settings.
     baseline
         Whether it is a trivial estimator that others are measured against.
+    files
+        Data files that it reads, relative to its own: their content is part of every row's key.
     state
         Structured type of what it keeps between samples; all zero after `reset`.
     step
@@ -103,6 +105,7 @@ class CompiledMethod:
     vehicle_parameters: tuple[str, ...] = ()
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     variants: ClassVar[Mapping[str, Any]] = {}
+    files: ClassVar[tuple[str, ...]] = ()
     baseline: ClassVar[bool] = False
     state: ClassVar[np.dtype[Any]]
     step: Callable[..., Any]

@@ -35,6 +35,7 @@ class Declaration:
     settings: dict[str, float | str | bool | None]
     file: str
     baseline: bool = False
+    files: tuple[str, ...] = ()
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -139,6 +140,7 @@ def declaration_of(
     given["variant"] = method.variant if compiled else variant
     given["settings"] = dict(method.settings) if compiled else dict(parameters)
     given["baseline"] = bool(getattr(method, "baseline", False))
+    given["files"] = getattr(method, "files", ())
     given["file"] = str(getattr(module, "__file__", None) or "")
     return declaration_from(given, type(method).__name__)
 
@@ -213,7 +215,21 @@ def declaration_from(given: Mapping[str, Any], kind: str = "method") -> Declarat
         settings=dict(settings),
         file=str(given.get("file") or ""),
         baseline=given.get("baseline") is True,
+        files=_files(given, name),
     )
+
+
+def _files(given: Mapping[str, Any], name: str) -> tuple[str, ...]:
+    """Return the data files that a method declares, relative to its own file."""
+    files = given.get("files") or ()
+    if not isinstance(files, list | tuple) or not all(
+        isinstance(item, str) and item and "\0" not in item for item in files
+    ):
+        raise InputError(
+            f"{name}: set 'files' to a tuple of file names, such as ('net.npz',) "
+            f"(it is {printable(repr(files))})"
+        )
+    return tuple(files)
 
 
 def check_names(what: str, names: Sequence[Any]) -> None:

@@ -9,6 +9,7 @@ folder of them) or by the path of a TOML file. A suite is a TOML file that names
 from __future__ import annotations
 
 import functools
+import hashlib
 import importlib
 import importlib.metadata
 import inspect
@@ -259,6 +260,16 @@ def method_digest(source: Source, declaration: Declaration) -> str:
     if source.kind == "file":
         files.append(Path(source.target.rpartition(":")[0]))  # it may make the class of another
     code = source_digest(*(path for path in files if path.is_file()))
+    for name in declaration.files:
+        place = (files[-1].parent if files else Path()) / name
+        try:
+            content = hashlib.sha256(place.read_bytes()).hexdigest()
+        except OSError as error:
+            raise InputError(
+                f"{declaration.name}: 'files' names '{name}', and {place} cannot be read: "
+                f"{(error.strerror or str(error)).lower()}"
+            ) from None
+        code = digest(code, name, content)
     if source.kind == "value":
         code = digest(code, repr(source.payload))
     settings = sorted(declaration.settings.items())

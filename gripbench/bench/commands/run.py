@@ -75,7 +75,7 @@ def run(
     from gripbench.bench.running.api import limits_of, order_in, plan_of
     from gripbench.bench.running.backends import Backend
     from gripbench.bench.running.recorded_scenarios import PREFIX
-    from gripbench.bench.running.rows import Row, frame_of
+    from gripbench.bench.running.rows import Row, frame_of, untracked
     from gripbench.bench.running.runner import run_plan
     from gripbench.bench.running.store import Store
     from gripbench.writing import check_writable, write_atomically
@@ -105,6 +105,12 @@ def run(
     shown = frame[frame["target"].isin([*targets, ""])] if targets else frame
     print_summary(summary(shown))
     print_failures(frame)
+    for label, words in untracked(rows).items():
+        console().print(
+            f"{label} reads what cannot be followed ({', '.join(words)}): its rows run again "
+            "each time",
+            markup=False,
+        )
     if export is not None:
         write_atomically(export, scores_csv(frame))
     counts = ", ".join(f"{count} {status}" for status, count in sorted(report.statuses.items()))

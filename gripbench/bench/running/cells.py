@@ -9,12 +9,15 @@ from __future__ import annotations
 import atexit
 import os
 import platform
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from gripbench.bench.catalogue.declarations import Source, describe_error
 from gripbench.bench.catalogue.registry import MethodSpec, method_digest
 from gripbench.bench.running.deadline import DeadlineError, deadline
+from gripbench.bench.running.dependencies import folder_of, kept, unchanged
 from gripbench.bench.running.execution import Outcome, SkippedError, execute, missing
 from gripbench.bench.running.fingerprints import versions, world_digest
 from gripbench.bench.running.processes import stop_starters
@@ -25,7 +28,7 @@ from gripbench.bench.running.store import row_path
 from gripbench.bench.scoring.scoring import DivergedError, score, targets_of
 from gripbench.envs.recordings import Recording
 from gripbench.envs.scenarios import Scenario
-from gripbench.errors import GripbenchError
+from gripbench.errors import GripbenchError, InputError
 from gripbench.sources import digest
 
 
@@ -160,24 +163,52 @@ def run_cell(cell: Cell, recording: Recording, limits: Limits, timed: bool) -> R
         reason = "the scenario has no truth for any of its estimates"
     if reason:
         return _row(cell, targets, "skipped", reason)
+    read: Mapping[str, Any] = {}
     try:
         outcome = _outcome(cell, recording, limits, timed)
+        read = outcome.read
         if isinstance(cell.scenario, RecordedScenario):
             recording = judged(recording, outcome.estimates)
         scores = score(outcome.estimates, declaration.outputs, targets, recording)
     except DivergedError as error:
-        return _row(cell, targets, "diverged", str(error))
+        return _resting_on(cell, _row(cell, targets, "diverged", str(error)), read)
     except SkippedError as error:
         return _row(cell, targets, "skipped", str(error))
     except CellFailure as failure:
         status: Status = failure.status  # type: ignore[assignment]
-        limit = limits.time if status == "timeout" else None
         row = _row(cell, targets, status, str(failure))
-        return row.model_copy(update={"time_limit": limit})
+        changes = {
+            "time_limit": limits.time if status == "timeout" else None,
+            "memory_limit": failure.memory,
+            "passing": failure.outside,
+        }
+        return _resting_on(cell, row.model_copy(update=changes), failure.read)
     except Exception as error:
-        return _row(cell, targets, "failed", describe_error(error))
+        return _resting_on(cell, _row(cell, targets, "failed", describe_error(error)), read)
     row = _row(cell, tuple(scores), "ok", "")
-    return row.model_copy(update={"scores": scores, "runtime": outcome.runtime})
+    row = row.model_copy(update={"scores": scores, "runtime": outcome.runtime})
+    return _resting_on(cell, row, outcome.read)
+
+
+def _resting_on(cell: Cell, row: Row, read: Mapping[str, Any]) -> Row:
+    """Return the row of an isolated method with what it rests on.
+
+    What ran must be what the key says: where a file is another one now than when it was read, or
+    than when the plan was made, the row says that and nothing else.
+    """
+    method = cell.method
+    if not method.isolated:
+        return row
+    folder = folder_of(method)
+    dependencies, untracked = kept(read, folder)
+    try:
+        same = method_digest(method.source, method.declaration) == method.digest
+    except (OSError, InputError):
+        same = False
+    if not (same and (untracked or unchanged(dependencies, folder))):
+        reason = "a file of the method changed while it ran: run the same command again"
+        return _row(cell, row.targets, "failed", reason).model_copy(update={"passing": True})
+    return row.model_copy(update={"dependencies": dependencies, "untracked": untracked})
 
 
 def _outcome(cell: Cell, recording: Recording, limits: Limits, timed: bool) -> Outcome:

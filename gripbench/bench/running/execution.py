@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from numbers import Real
 from typing import Any
 
@@ -53,10 +53,13 @@ class Outcome:
         Structured array, shape (n,).
     runtime
         Times of its steps [s].
+    read
+        What an isolated method was seen to read, see `running.audit.report`.
     """
 
     estimates: npt.NDArray[Any]
     runtime: Runtime
+    read: Mapping[str, Any] = field(default_factory=dict)
 
 
 def missing(

@@ -22,9 +22,12 @@ import struct
 import sys
 import threading
 import time
+from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
+from numba.core.caching import NullCache
+from numba.core.dispatcher import Dispatcher
 
 from gripbench.bench.catalogue.declarations import (
     Declaration,
@@ -32,6 +35,7 @@ from gripbench.bench.catalogue.declarations import (
     declaration_of,
     describe_error,
 )
+from gripbench.bench.running import audit
 from gripbench.bench.running.confinement import confine, end_children, end_with
 from gripbench.bench.running.execution import (
     Observation,
@@ -51,6 +55,7 @@ from gripbench.envs.plants.simulation import Simulation
 from gripbench.errors import GripbenchError
 from gripbench.methods import drivers
 from gripbench.methods.contract import CompiledMethod
+from gripbench.sources import source_files
 
 
 class _Line:
@@ -179,6 +184,7 @@ def _serve_plugin(line: _Line, forks: bool) -> NoReturn:
         end_with(os.getppid())
     request = line.message()
     confine(request["memory"])
+    audit.install()
     try:
         plugin = _load(request)
     except MemoryError:
@@ -188,7 +194,8 @@ def _serve_plugin(line: _Line, forks: bool) -> NoReturn:
     else:
         shared = forks and threading.active_count() == 1 and _threads() == 1
         content = dataclasses.asdict(plugin.declaration)
-        line.send({"status": "ok", "declaration": content, "shared": shared})
+        seen = audit.report()
+        line.send({"status": "ok", "declaration": content, "shared": shared, "read": seen})
         if shared:
             _fork_cells(line, plugin)
         _serve_cell(line, plugin, line.message())
@@ -213,8 +220,27 @@ def _load(request: dict[str, Any]) -> _Plugin:
     variant, parameters = request["variant"], request["parameters"]
     method = source.make(variant, parameters)
     declaration = declaration_of(method, variant, parameters)
+    _forget_compiled(declaration)
     _compile(method)
     return _Plugin(source, variant, parameters, declaration)
+
+
+def _forget_compiled(declaration: Declaration) -> None:
+    """Leave numba's files of an earlier run alone where they may hold what has changed.
+
+    They are valid while the file and what it imports by name is the same. Where the plug-in read
+    more than that, its values may be constants in the compiled code: that is compiled afresh.
+    """
+    read = {Path(name) for kind, name, _ in audit.report()["seen"] if kind != "environment"}
+    followed = source_files(Path(declaration.file)) if declaration.file else set()
+    if read <= followed:
+        return
+    for module in list(sys.modules.values()):
+        file = getattr(module, "__file__", None) or ""
+        if file and Path(file) in read:
+            for value in list(vars(module).values()):
+                if isinstance(value, Dispatcher):
+                    value._cache = NullCache()
 
 
 def _compile(method: Any) -> None:
@@ -269,7 +295,7 @@ def _samples(line: _Line, method: Any, declaration: Declaration) -> None:
     while True:
         nonce, index, *sample = request.unpack(line.receive(request.size))
         if index == END:
-            content = message_bytes({})
+            content = message_bytes({"read": audit.report()})
             head = reply.pack(nonce, index, process(), FINISHED, len(content), *nothing)
             line.put(head + content)
             return
@@ -291,7 +317,7 @@ def _failure(error: BaseException) -> dict[str, Any]:
     if isinstance(error, MemoryError):
         return {"status": "out of memory", "reason": ""}
     status = "skipped" if isinstance(error, SkippedError) else "failed"
-    return {"status": status, "reason": describe_error(error)}
+    return {"status": status, "reason": describe_error(error), "read": audit.report()}
 
 
 def _seed(seed: str) -> None:

@@ -208,6 +208,15 @@ def row_from(content: dict[str, Any], source: str) -> Row:
     return parse(Row, content, source)
 
 
+def untracked(rows: Iterable[Row]) -> dict[str, list[str]]:
+    """Return what each method did that no digest can follow, by label; nothing: left out."""
+    found: dict[str, set[str]] = {}
+    for row in rows:
+        if row.untracked:
+            found.setdefault(row.label, set()).update(row.untracked)
+    return {label: sorted(words) for label, words in found.items()}
+
+
 def frame_of(rows: Iterable[Row]) -> pd.DataFrame:
     """Return rows as a frame, one line for each target of each row.
 

@@ -19,6 +19,7 @@ import numba
 from gripbench.bench.catalogue.registry import MethodSpec
 from gripbench.bench.running.backends import Backend, WorkerLostError
 from gripbench.bench.running.cells import Cell, Task, cell_of, close_sandboxes, run_tasks
+from gripbench.bench.running.dependencies import folder_of, unchanged
 from gripbench.bench.running.fingerprints import world_digest
 from gripbench.bench.running.recorded_scenarios import RecordedScenario, on_recording
 from gripbench.bench.running.rows import Row
@@ -188,6 +189,8 @@ def _reusable(store: Store, cell: Cell, limits: Limits) -> Row | None:
     if row.status == "timeout" and (row.time_limit or 0.0) < limits.time:
         return None
     if row.memory_limit is not None and row.memory_limit < limits.memory / 1024**2:
+        return None
+    if row.dependencies and not unchanged(row.dependencies, folder_of(cell.method)):
         return None
     return row
 

@@ -62,11 +62,26 @@ class Limits:
 
 
 class CellFailure(GripbenchError):  # noqa: N818 - a result of a cell, not a mistake of the harness
-    """A method failed; `status` says how."""
+    """A method failed; `status` says how.
 
-    def __init__(self, status: str, reason: str) -> None:
+    `read` is what it was seen to read, `memory` the limit [MiB] that ended it, and `outside` tells
+    whether something else than the method and its limits did.
+    """
+
+    def __init__(
+        self,
+        status: str,
+        reason: str,
+        *,
+        read: Mapping[str, Any] | None = None,
+        memory: float | None = None,
+        outside: bool = False,
+    ) -> None:
         super().__init__(reason)
         self.status = status
+        self.read = read or {}
+        self.memory = memory
+        self.outside = outside
 
 
 @dataclass(frozen=True)
@@ -91,6 +106,7 @@ class Sandbox:
         self.limits = limits
         self._process: PluginProcess | None = None
         self._loaded: tuple[Settings, Declaration] | None = None
+        self._read: dict[str, Any] = {}
 
     def declare(self, source: Source, variant: str, parameters: dict[str, Any]) -> Declaration:
         """Return what a method declares.
@@ -161,6 +177,7 @@ class Sandbox:
             raise CellFailure("failed", f"its declaration cannot be read: {error}") from None
         process.shared = process.forks and answer.get("shared") is True
         self._loaded = (settings, declaration)
+        self._read = _read(answer)
         return declaration
 
     def _run(
@@ -195,7 +212,7 @@ class Sandbox:
         estimates = np.empty(len(observations), record_type(declaration.outputs))
         values = estimates.view(np.float64).reshape(len(observations), -1)
         values[:] = replies["estimates"]
-        return Outcome(estimates, runtime_of(replies["took"] * 1e-9, period))
+        return Outcome(estimates, runtime_of(replies["took"] * 1e-9, period), self._read)
 
     def _stream(
         self,
@@ -224,7 +241,7 @@ class Sandbox:
                     self._fail(line, reply, expected[k * head : (k + 1) * head], deadline)
                 if k < len(observations):
                     replies[k * width : (k + 1) * width] = reply
-            read_message(lambda length: line.receive(length, deadline))
+            self._read = _read(read_message(lambda length: line.receive(length, deadline)))
         except (LateError, EOFError, OSError) as error:
             self._lost(error, self.limits.time)
         except ValueError as error:
@@ -282,9 +299,10 @@ class Sandbox:
         if status == "out of memory":
             self.close()  # what it holds may never be given back
             limit = self.limits.memory / 1024**2
-            raise CellFailure("failed", f"out of memory (limit {limit:.0f} MiB)")
+            raise CellFailure("failed", f"out of memory (limit {limit:.0f} MiB)", memory=limit)
         reason = printable(str(answer.get("reason", "")))
-        raise CellFailure("skipped" if status == "skipped" else "failed", reason)
+        read = _read(answer) or self._read
+        raise CellFailure("skipped" if status == "skipped" else "failed", reason, read=read)
 
     def _lost(self, error: Exception, limit: float) -> None:
         """Raise why a process does not answer any more."""
@@ -292,13 +310,15 @@ class Sandbox:
         assert process is not None
         if isinstance(error, LateError):
             process.end(grace=0.0)
-            raise CellFailure("timeout", f"stopped after the time limit of {limit:g} s")
+            reason = f"stopped after the time limit of {limit:g} s"
+            raise CellFailure("timeout", reason, read=self._read)
         if process.shared and process.finish_cell(ENDING):
             code = process.cell_code
             process.end(grace=0.0)
         else:
             code = process.end(grace=ENDING)
-        raise CellFailure("failed", _last_words(code))
+        outside = code in _FROM_OUTSIDE
+        raise CellFailure("failed", _last_words(code), read=self._read, outside=outside)
 
 
 def _loading(settings: Settings, limits: Limits) -> dict[str, Any]:
@@ -346,6 +366,28 @@ def _digest(*parts: bytes) -> str:
         state.update(len(part).to_bytes(8, "big"))
         state.update(part)
     return state.hexdigest()
+
+
+_FROM_OUTSIDE = tuple(
+    -getattr(signals, name)
+    for name in ("SIGKILL", "SIGTERM", "SIGINT", "SIGHUP")
+    if hasattr(signals, name)
+)
+"""How a process ends that somebody else ended: a user, a scheduler, a system without memory."""
+
+
+def _read(answer: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a process says that it has read; nothing where it says no such thing."""
+    read = answer.get("read")
+    if not isinstance(read, dict):
+        return {}
+    seen, untracked = read.get("seen"), read.get("untracked")
+    if not isinstance(seen, list) or not isinstance(untracked, list):
+        return {}
+    for item in seen:
+        if not (isinstance(item, list) and len(item) == 3 and {*map(type, item)} == {str}):
+            return {}
+    return {"seen": seen, "untracked": [str(item) for item in untracked]}
 
 
 def _last_words(code: int | None) -> str:
