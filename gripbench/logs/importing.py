@@ -95,7 +95,7 @@ def import_log(log: Path, channel_map: ChannelMap | Path) -> ImportedLog:
             databases = tuple(_beside(beside, entry) for entry in file.databases())
             file = file.model_copy(update={"database": databases})
         logs[short] = read_log(path, file, _wanted(chosen, short, file))
-    return _assemble(logs, chosen, vehicle_values(chosen, beside))
+    return assemble(logs, chosen, vehicle_values(chosen, beside))
 
 
 def _beside(channel_map: Path, entry: str) -> str:
@@ -122,7 +122,7 @@ def import_frame(frame: pd.DataFrame, channel_map: ChannelMap | Mapping[str, Any
     if len(chosen.log_files()) > 1:
         raise InputError("channel map: key 'files': a frame is one log, not several")
     short = next(iter(chosen.log_files()))
-    return _assemble({short: log_of_frame(frame)}, chosen, vehicle_values(chosen, None))
+    return assemble({short: log_of_frame(frame)}, chosen, vehicle_values(chosen, None))
 
 
 def _wanted(channel_map: ChannelMap, short: str, file: LogFile) -> set[str]:
@@ -134,9 +134,16 @@ def _wanted(channel_map: ChannelMap, short: str, file: LogFile) -> set[str]:
     return names - {""}
 
 
-def _assemble(
+def assemble(
     logs: dict[str, Log], channel_map: ChannelMap, vehicle: dict[str, float]
 ) -> ImportedLog:
+    """Return the recordings of logs that are read, by the short names of the map's files.
+
+    Raises
+    ------
+    InputError
+        On the first mistake in the map or the logs.
+    """
     recordings = []
     report = QualityReport(())
     notes = [f"{log.path}: {note}" for log in logs.values() for note in log.notes]

@@ -133,6 +133,8 @@ class Column(Configuration):
     delay
         Age [s] of the value at its time. An observation stays where it arrived, for GPS the
         channel `gps_time` tells its age; a reference is moved back to when it was true.
+    shift
+        Seconds to add to the column's times: its clock, against that of the other columns.
     zero
         Take the mean over the first standstill, or the first straight stretch, for the zero.
     """
@@ -153,6 +155,7 @@ class Column(Configuration):
     time: Name = ""
     rate_over: float = Field(default=0.0, ge=0.0, le=60.0)
     delay: float = Field(default=0.0, ge=0.0, le=10.0)
+    shift: float = Field(default=0.0, ge=-1e4, le=1e4)
     zero: Literal["", "standstill", "straight"] = ""
 
     @field_validator("per")

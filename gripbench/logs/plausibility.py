@@ -1,97 +1,133 @@
-"""Units and signs by physics: every law that binds two channels gives the factor between them.
+"""Units, signs and clocks by physics: what contradicts a law, and what mends the map.
 
-A law holds where its factor is near 1. Where some do not, the smallest change of the map (another
-unit, the other sign, of one channel or two) that makes all of them hold is the mend to suggest.
+Where some laws do not hold, the smallest change (another unit, the other sign, of one channel or
+two) that makes all of them hold is the mend to suggest. Each is tried before it is suggested: the
+changed series must satisfy every law.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from gripbench.envs.vehicles import GRAVITY
-from gripbench.logs.series import Floats, Series
+from gripbench.logs.alignment import Lag, lags, shifted
+from gripbench.logs.laws import Law, laws_of, speed_of
+from gripbench.logs.series import Series
 from gripbench.logs.units import UNITS
 
-_TOLERANCE = math.log(1.6)
-_LOOSE = math.log(2.5)  # where understeer, load transfer or a ramp of the road comes in
-_STEPS = (0.1, 0.3, 1.0, 3.0)  # s; the coarser ones average noise away
-_FEWEST = 20  # samples of the grid
-_CORRELATED = 0.75
-_EARTH_FIELD = 48e-6  # T, between 22 and 67 over the globe
-_WHEELS = (
-    "wheel_speed_front", "wheel_speed_rear", "wheel_speed_front_left", "wheel_speed_front_right",
-    "wheel_speed_rear_left", "wheel_speed_rear_right",
-)  # fmt: skip
-_FIELD = ("magnetic_field_x", "magnetic_field_y", "magnetic_field_z")
+__all__ = ["Misfit", "misfits", "speed_of"]
 
+_STEERING_RATIO = 16.0  # a usual one
+_RARE = ("mrad", "rev", "mrad/s", "deg/h", "rev/s", "ft/s", "mm/s", "ft/s^2", "mg", "us", "ns")
+"""Units that nobody meant when another fits."""
 
-@dataclass(frozen=True)
-class Law:
-    """One law of physics, evaluated.
-
-    Attributes
-    ----------
-    text
-        The law in words of signals.
-    powers
-        Exponent with which each series, by key, enters the factor.
-    factor
-        Left side over right side; 1 where the law holds.
-    tolerance
-        How far the factor's logarithm may be from 0.
-    """
-
-    text: str
-    powers: dict[str, int]
-    factor: float
-    tolerance: float = _TOLERANCE
-
-    def holds(self, changes: dict[str, float]) -> bool:
-        """Whether the law holds once each series, by key, is multiplied by its change."""
-        factor = self.factor
-        for key, power in self.powers.items():
-            change = changes.get(key, 1.0)
-            factor *= math.copysign(abs(change) ** power, change if power % 2 else 1.0)
-        return factor > 0.0 and abs(math.log(factor)) <= self.tolerance
+_FAR = 2.0  # times a limit
+_TRIED = 40  # mends at most, the likeliest first
+_PASSES = 3
+_SLOWEST, _FASTEST = 1.0, 2e-5  # s between samples of an inertial sensor
 
 
 @dataclass(frozen=True)
 class Misfit:
-    """A law that does not hold, and the change of the map that mends it."""
+    """A law that does not hold, and the change of the map that mends it.
+
+    Attributes
+    ----------
+    key
+        The suspect, or several joined by `and`.
+    message
+        What was found.
+    suggestion
+        The change in words; empty where none mends it.
+    check
+        `physics`, `limits` or `clock`.
+    changes
+        The keys to set, by table.
+    """
 
     key: str
     message: str
     suggestion: str = ""
+    check: str = "physics"
+    changes: dict[str, dict[str, str | float]] = field(default_factory=dict)
 
 
 def misfits(
     channels: dict[str, Series], reference: dict[str, Series], vehicle: dict[str, float]
 ) -> list[Misfit]:
-    """Return what contradicts physics.
+    """Return what contradicts physics; followed, the suggestions leave nothing to find.
 
     Parameters
     ----------
     channels, reference
         Series by signal name.
     vehicle
-        Vehicle parameters; the laws that need one that is missing are left out.
+        Vehicle parameters; the laws that need one that is missing are left out or looser.
     """
-    laws = list(_laws(channels, reference, vehicle))
+    found = _of_sampling(channels)
+    if found:  # with a wrong unit of time no other law means anything
+        return found
+    late: list[Lag] = []
+    for _ in range(_PASSES):
+        new = lags(channels, reference, vehicle)
+        late += [one for one in new if one.key not in {known.key for known in late}]
+        channels, reference = shifted(channels, new), shifted(reference, new)
+        misfit, mend = _misfit_of_units(channels, reference, vehicle)
+        found += misfit
+        if not mend:
+            break
+        channels, reference = _scaled(channels, mend), _scaled(reference, mend)
+    series = {s.key: s for s in [*channels.values(), *reference.values()]}
+    return found + [_of_lag(lag, series[lag.key]) for lag in late]
+
+
+def _of_sampling(channels: dict[str, Series]) -> list[Misfit]:
+    """Return that the unit of time is wrong, as the rate of inertial sensors shows."""
+    for name in ("yaw_rate", "accel_y", "accel_x"):
+        if name not in channels or len(channels[name].times) < 3:
+            continue
+        series = channels[name]
+        usual = float(np.median(np.diff(series.times)))
+        if _FASTEST < usual < _SLOWEST:
+            return []
+        # Seen in seconds; logs whose times are seconds already are the only ones that are so slow.
+        fitting = [unit for unit, f in (("ms", 1e-3), ("us", 1e-6)) if 5e-4 <= usual * f <= 0.2]
+        suggestion = f'time: unit = "{fitting[0]}"' if usual >= _SLOWEST and fitting else ""
+        return [
+            Misfit(
+                series.key,
+                f"samples come every {usual:.3g} s, no rate of such a sensor: is the unit of time "
+                "right?",
+                suggestion,
+                changes={"time": {"unit": fitting[0]}} if suggestion else {},
+            )
+        ]
+    return []
+
+
+def _misfit_of_units(
+    channels: dict[str, Series], reference: dict[str, Series], vehicle: dict[str, float]
+) -> tuple[list[Misfit], dict[str, float]]:
+    """Return what the laws find, and the change of each series that mends it."""
+    laws = list(laws_of(channels, reference, vehicle))
     broken = [law for law in laws if not law.holds({})]
     if not broken:
-        return []
+        return [], {}
     series = {s.key: s for s in [*channels.values(), *reference.values()]}
-    found = [f"{law.text}: the left side is {law.factor:.3g} times the right one" for law in broken]
-    mends = _mends(laws, broken, series)
+    found = [law.fault() for law in broken]
+    mends = [
+        mend
+        for mend in _mends(laws, broken, series)
+        if _mended(channels, reference, vehicle, mend, broken)
+    ]
     if not mends:
         return [
             Misfit(next(iter(law.powers)), text) for law, text in zip(broken, found, strict=True)
-        ]
+        ], {}
     best = mends[0]
     suggestion = " and ".join(f"{key}: {_change_text(series[key], best[key])}" for key in best)
     if len(mends) > 1:
@@ -100,167 +136,46 @@ def misfits(
             for mend in mends[1:3]
         ]
         suggestion += "; or " + "; or ".join(others)
-    return [Misfit(" and ".join(best), "; ".join(found), suggestion)]
+    changes = {key: _change_keys(series[key], change) for key, change in best.items()}
+    # A limit alone, hardly passed, is no proof of another unit.
+    check = "physics" if any(not law.limit or law.factor > _FAR for law in broken) else "limits"
+    return [Misfit(" and ".join(best), "; ".join(found), suggestion, check, changes)], best
 
 
-def speed_of(
-    channels: dict[str, Series], reference: dict[str, Series], vehicle: dict[str, float]
-) -> Series | None:
-    """Return the best series of the forward speed [m/s], or None."""
-    for source in (reference, channels):
-        for name in ("speed_x", "speed_gps"):
-            if name in source:
-                return source[name]
-    radius = vehicle.get("wheel_radius")
-    for name in ("wheel_speed_rear", "wheel_speed_rear_left", "wheel_speed_front"):
-        if radius and name in channels:
-            return replace(channels[name], values=channels[name].values * radius)
-    return None
+def _mended(
+    channels: dict[str, Series],
+    reference: dict[str, Series],
+    vehicle: dict[str, float],
+    mend: dict[str, float],
+    broken: Sequence[Law],
+) -> bool:
+    """Whether no law is broken once the mend is made, of those that it could touch or others."""
+    again = laws_of(_scaled(channels, mend), _scaled(reference, mend), vehicle)
+    return all(law.holds({}) or law.text.startswith("speed * sideslip") for law in again)
 
 
-def _laws(
-    channels: dict[str, Series], reference: dict[str, Series], vehicle: dict[str, float]
-) -> Iterator[Law]:
-    speed = speed_of(channels, reference, vehicle)
-    yaw_rate, steer = channels.get("yaw_rate"), channels.get("steer_angle")
-    if speed is not None:
-        if yaw_rate is not None and "accel_y" in channels:
-            yield from _moving_law(
-                "accel_y = speed * yaw_rate",
-                [(channels["accel_y"], 1), (speed, -1), (yaw_rate, -1)],
-                lambda _, a, v, r: (a, v * r),
-                _LOOSE,
-            )
-        if "accel_x" in channels:
-            yield from _moving_law(
-                "accel_x = rate of change of speed",
-                [(channels["accel_x"], 1), (speed, -1)],
-                lambda step, a, v: (a, np.gradient(v, step)),
-                _LOOSE,
-            )
-        wheelbase = vehicle.get("cg_to_front", 0.0) + vehicle.get("cg_to_rear", 0.0)
-        if steer is not None and yaw_rate is not None and wheelbase:
-            yield from _moving_law(
-                "yaw_rate = speed * steer_angle / wheelbase",
-                [(yaw_rate, 1), (speed, -1), (steer, -1)],
-                lambda _, r, v, d: (r, v * d / wheelbase),
-                _LOOSE,
-            )
-        radius = vehicle.get("wheel_radius")
-        for name in _WHEELS:
-            if radius and name in channels and channels[name].key != speed.key:
-                text = f"{name} * wheel_radius = {speed.name}"
-                yield from _level_law(text, channels[name], speed, radius)
-        for name in ("speed_x", "speed_gps"):
-            if name in channels and channels[name].key != speed.key:
-                yield from _level_law(f"{name} = {speed.key}", channels[name], speed)
-    for name in ("yaw", "course"):
-        angle = channels.get(name) or reference.get(name)
-        if angle is not None and yaw_rate is not None:
-            turning = replace(angle, values=np.unwrap(angle.values))
-            yield from _moving_law(
-                f"yaw_rate = rate of change of {name}",
-                [(yaw_rate, 1), (turning, -1)],
-                lambda step, r, h: (r, np.gradient(h, step)),
-                _TOLERANCE,
-            )
-    for name in ("yaw_rate", "accel_x", "accel_y", "sideslip"):
-        if name in channels and name in reference and channels[name].key != reference[name].key:
-            yield from _moving_law(
-                f"{name} = {reference[name].key}",
-                [(channels[name], 1), (reference[name], -1)],
-                lambda _, a, b: (a, b),
-                _TOLERANCE,
-            )
-    slip, left, ahead = (reference.get(name) for name in ("sideslip", "speed_y", "speed_x"))
-    if slip and left and ahead and "derived" not in slip.key:
-        yield from _moving_law(
-            "sideslip = atan2(speed_y, speed_x)",
-            [(slip, 1), (left, -1), (ahead, 1)],
-            lambda _, b, y, x: (b[x > 1.0], np.arctan2(y, x)[x > 1.0]),
-            _TOLERANCE,
-        )
-    yield from _field_laws(channels)
+def _scaled(series: dict[str, Series], mend: dict[str, float]) -> dict[str, Series]:
+    return {
+        name: replace(one, values=one.values * mend[one.key]) if one.key in mend else one
+        for name, one in series.items()
+    }
 
 
-def _field_laws(channels: dict[str, Series]) -> Iterator[Law]:
-    """Yield what gravity and the earth's magnetic field say of their sensors."""
-    if "accel_z" in channels:
-        vertical = channels["accel_z"]
-        level = float(np.median(vertical.values)) / GRAVITY
-        if level:
-            yield Law("accel_z = gravity", {vertical.key: 1}, level)
-    if all(name in channels for name in _FIELD):
-        medians = {name: abs(float(np.median(channels[name].values))) for name in _FIELD}
-        strength = math.hypot(*medians.values())
-        if strength:
-            # One unit serves all three. Which way a component points is as may be: only the
-            # magnitude is judged, and loosely, for a body's own field may exceed the earth's.
-            strongest = channels[max(medians, key=lambda name: medians[name])]
-            factor = (strength / _EARTH_FIELD) ** 2
-            text = "magnetic field squared = the earth's squared"
-            yield Law(text, {strongest.key: 2}, factor, 2.0 * math.log(6.0))
-
-
-def _moving_law(
-    text: str,
-    terms: list[tuple[Series, int]],
-    sides: Callable[..., tuple[Floats, Floats]],
-    tolerance: float,
-) -> Iterator[Law]:
-    """Yield the law whose sides vary together, if the log excites it enough."""
-    series = [one for one, _ in terms]
-    best, factor = _CORRELATED, 0.0
-    for step in _STEPS:
-        grid = _on_grid(series, step)
-        if grid is None:
-            break
-        left, right = sides(step, *grid)
-        if len(left) < _FEWEST:
-            continue
-        left, right = left - left.mean(), right - right.mean()
-        spread = float(np.std(left)), float(np.std(right))
-        if min(spread) == 0.0:
-            continue
-        correlation = float(np.mean(left * right)) / (spread[0] * spread[1])
-        if abs(correlation) > best:
-            best, factor = abs(correlation), math.copysign(spread[0] / spread[1], correlation)
-    if factor:
-        yield Law(text, {one.key: power for one, power in terms}, factor, tolerance)
-
-
-def _level_law(text: str, left: Series, right: Series, factor: float = 1.0) -> Iterator[Law]:
-    """Yield the law whose sides are equal in level, as two speeds are."""
-    grid = _on_grid([left, right], _STEPS[0])
-    if grid is None:
-        return
-    a, b = grid
-    moving = np.abs(b) > 0.2 * np.max(np.abs(b), initial=0.0)
-    if moving.sum() < _FEWEST or not np.any(b[moving]):
-        return
-    ratio = float(np.median(a[moving] / b[moving])) * factor
-    if ratio != 0.0:
-        yield Law(text, {left.key: 1, right.key: -1}, ratio)
-
-
-def _on_grid(series: list[Series], step: float) -> list[Floats] | None:
-    """Return the means of the series over the same cells of time, or None if these are too few."""
-    start = max(s.times[0] for s in series)
-    end = min(s.times[-1] for s in series)
-    count = int((end - start) / step) - 1
-    if count < _FEWEST:
-        return None
-    centres = start + step * (1.0 + np.arange(count))
-    columns = []
-    for s in series:
-        mean = np.interp(centres, s.times, s.values)
-        total = np.concatenate([[0.0], np.cumsum(s.values)])
-        first = np.searchsorted(s.times, centres - 0.5 * step)
-        last = np.searchsorted(s.times, centres + 0.5 * step)
-        averaged = last - first > 1  # a slower series has at most one sample in a cell
-        mean[averaged] = (total[last] - total[first])[averaged] / (last - first)[averaged]
-        columns.append(mean)
-    return columns
+def _of_lag(lag: Lag, series: Series) -> Misfit:
+    column = series.column
+    amount = round(lag.lag, 3)
+    if series.key.startswith("reference.") and column.delay + amount >= 0.0:
+        key, value = "delay", round(column.delay + amount, 3)
+    else:
+        key, value = "shift", round(column.shift - amount, 3)
+    return Misfit(
+        series.key,
+        f"comes {abs(lag.lag):.3f} s +- {lag.deviation:.3f} s "
+        f"{'late' if lag.lag > 0.0 else 'early'} against the {lag.against}",
+        f"{series.key}: {key} = {value:g}",
+        "clock",
+        {series.key: {key: value}},
+    )
 
 
 def _mends(laws: list[Law], broken: list[Law], series: dict[str, Series]) -> list[dict[str, float]]:
@@ -273,10 +188,11 @@ def _mends(laws: list[Law], broken: list[Law], series: dict[str, Series]) -> lis
             for changes in itertools.product(*(choices[key] for key in keys)):
                 mend = dict(zip(keys, changes, strict=True))
                 if all(law.holds(mend) for law in laws):
-                    mends.append((_misfit(laws, mend), mend))
+                    mere_signs = all(abs(change) == 1.0 for change in changes)
+                    mends.append((not mere_signs, _misfit(laws, mend), mend))
         if mends:
-            mends.sort(key=lambda item: item[0])
-            return _one_a_series([mend for _, mend in mends])
+            mends.sort(key=lambda item: item[:2])
+            return _one_a_series([mend for *_, mend in mends])[:_TRIED]
     return []
 
 
@@ -290,25 +206,23 @@ def _one_a_series(mends: list[dict[str, float]]) -> list[dict[str, float]]:
 
 def _misfit(laws: list[Law], mend: dict[str, float]) -> float:
     """Return how far the mended laws are from holding exactly; mere signs come first."""
-    total = 0.0
-    for law in laws:
-        factor = law.factor
-        for key, power in law.powers.items():
-            factor *= abs(mend.get(key, 1.0)) ** power
-        total += math.log(abs(factor)) ** 2
-    return total
+    return sum(
+        math.log(abs(law.changed(mend))) ** 2
+        for law in laws
+        if not law.limit and law.changed(mend) and math.isfinite(law.tolerance)
+    )
 
 
 def _changes(series: Series) -> list[float]:
     """Return the factors that another unit or sign of a series would bring."""
     given = UNITS[series.column.unit]
-    factors = {
+    factors: set[float] = {
         round(unit.factor / given.factor, 12)
-        for unit in UNITS.values()
-        if unit.dimension == given.dimension
+        for name, unit in UNITS.items()
+        if unit.dimension == given.dimension and name not in _RARE
     }
     if series.name == "steer_angle":
-        factors |= {factor / ratio for factor in list(factors) for ratio in (10.0, 15.0, 22.0)}
+        factors |= {factor / _STEERING_RATIO for factor in factors}
     return [
         sign * factor for factor in sorted(factors) for sign in (1.0, -1.0) if sign * factor != 1.0
     ]
@@ -316,21 +230,31 @@ def _changes(series: Series) -> list[float]:
 
 def _change_text(series: Series, change: float) -> str:
     """Return a change of the map in the map's own words."""
-    given = UNITS[series.column.unit]
     parts = []
-    matches = [
-        name
-        for name, unit in UNITS.items()
-        if unit.dimension == given.dimension
-        and abs(unit.factor / given.factor / abs(change) - 1.0) < 1e-6
-    ]
-    if matches and matches[0] != series.column.unit and abs(abs(change) - 1.0) > 1e-9:
-        parts.append(f'unit = "{matches[0]}"')
-    elif not matches:
-        parts.append(
-            f"scale = {abs(change) * series.column.scale:.3g} "
-            "(a steering wheel's angle? divide it by the steering ratio)"
-        )
-    if change < 0.0:
-        parts.append(f"sign = {-series.column.sign}")
+    for key, value in _change_keys(series, change).items():
+        parts.append(f'{key} = "{value}"' if isinstance(value, str) else f"{key} = {value:.3g}")
+        if key == "scale":
+            parts[-1] += " (a steering wheel's angle? one over the steering ratio)"
     return ", ".join(parts)
+
+
+def _change_keys(series: Series, change: float) -> dict[str, str | float]:
+    """Return a change of the map as the keys to set."""
+    given = UNITS[series.column.unit]
+    keys: dict[str, str | float] = {}
+    for divisor in (1.0, _STEERING_RATIO):
+        matches = [
+            name
+            for name, unit in UNITS.items()
+            if unit.dimension == given.dimension
+            and abs(unit.factor / given.factor / divisor / abs(change) - 1.0) < 1e-6
+        ]
+        if matches:
+            if divisor != 1.0:
+                keys["scale"] = series.column.scale / divisor
+            if series.column.unit not in matches:
+                keys["unit"] = matches[0]
+            break
+    if change < 0.0:
+        keys["sign"] = -series.column.sign
+    return keys

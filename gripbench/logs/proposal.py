@@ -9,8 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
 from gripbench.envs.signals import SIGNALS
+from gripbench.errors import GripbenchError
+from gripbench.logs.channel_map import ChannelMap
+from gripbench.logs.importing import assemble
 from gripbench.logs.log import Log, LogColumn
 from gripbench.logs.naming import REFERENCE_ALWAYS, Guess, guesses, written_unit
 from gripbench.logs.time_columns import TimeTable, time_table
@@ -20,6 +24,7 @@ _SPEEDS = ("speed_x", "speed_gps")
 _STEERING_RATIO = 16.0
 _WIDEST_ROAD_ANGLE = 0.9  # rad; wheels turn no further
 _RADIUS = 0.3  # m
+_MENDS = 3
 _SIGN_NAMES = re.compile(r"(sign|vz|vorzeichen|dir(ection)?)$", re.I)
 _VALID_NAMES = re.compile(r"(valid|ok|qf|validity)$", re.I)
 
@@ -30,6 +35,7 @@ class Entry:
 
     keys: dict[str, Any]
     reasons: list[str] = field(default_factory=list)
+    told: bool = True  # whether the log itself tells the unit
 
 
 @dataclass
@@ -62,7 +68,9 @@ class Draft:
 
 def propose(path: Path, logs: dict[str, Log], databases: tuple[str, ...] = ()) -> str:
     """Return a map for logs by short name; one that is alone has the empty name."""
-    return text_of(draft(path, logs, databases))
+    made = draft(path, logs, databases)
+    _mend_by_physics(made, logs)
+    return text_of(made)
 
 
 def draft(path: Path, logs: dict[str, Log], databases: tuple[str, ...]) -> Draft:
@@ -176,7 +184,7 @@ def _entry(name: str, column: LogColumn, guess: Guess, log: Log) -> Entry | None
         reasons.append(f"where the map names no vehicle, the wheels' radius is {_RADIUS:g} m")
     if guess.signal == "steer_angle":
         _steering(name, column, keys, reasons, log)
-    return Entry(keys, reasons)
+    return Entry(keys, reasons, told)
 
 
 def _unit(name: str, column: LogColumn, guess: Guess) -> tuple[str | None, bool]:
@@ -219,6 +227,28 @@ def _steering(
             f"a steering wheel's angle; {_STEERING_RATIO:g} is a usual steering ratio, put your "
             "car's own"
         )
+
+
+def _mend_by_physics(made: Draft, logs: dict[str, Log]) -> None:
+    """Set units and signs that the log does not tell so that the laws of the vehicle hold."""
+    for _ in range(_MENDS):
+        try:
+            report = assemble(logs, ChannelMap.model_validate(made.content()), {}).report
+        except (GripbenchError, ValidationError):  # the import will say it
+            return
+        changes = {
+            key: keys
+            for finding in report.findings
+            if finding.check == "physics"
+            for key, keys in finding.changes.items()
+            if key in made.tables and (not made.tables[key].told or "unit" not in keys)
+        }
+        if not changes:
+            return
+        for key, keys in changes.items():
+            made.tables[key].keys |= keys
+            said = ", ".join(f"{name} = {_toml(value)}" for name, value in keys.items())
+            made.tables[key].reasons.append(f"{said}: so says the physics of the other channels")
 
 
 def _settle_speed(made: Draft) -> None:

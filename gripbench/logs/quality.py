@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, replace
-from typing import Literal
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -43,6 +43,8 @@ class Finding:
         What was found.
     suggestion
         What to change in the map; empty where there is nothing to change.
+    changes
+        The same as keys of the map to set, by table.
     """
 
     severity: Severity
@@ -50,6 +52,7 @@ class Finding:
     channel: str
     message: str
     suggestion: str = ""
+    changes: dict[str, dict[str, Any]] = field(default_factory=dict)
 
     def line(self) -> str:
         """Return the finding as one line."""
@@ -79,7 +82,7 @@ class QualityReport:
         """Return the findings of one severity."""
         return tuple(finding for finding in self.findings if finding.severity == severity)
 
-    def records(self) -> list[dict[str, str]]:
+    def records(self) -> list[dict[str, Any]]:
         """Return the findings as dictionaries."""
         return [asdict(finding) for finding in self.findings]
 
@@ -135,10 +138,11 @@ def judge(
 def _of_misfit(misfit: Misfit) -> Finding:
     return Finding(
         "wrong" if misfit.suggestion else "warning",
-        "physics",
+        misfit.check,
         misfit.key,
         misfit.message,
         misfit.suggestion,
+        misfit.changes,
     )
 
 

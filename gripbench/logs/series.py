@@ -103,7 +103,7 @@ def series_of(
     return Series(
         name=name,
         key=key,
-        times=times + time.shift,
+        times=times + (time.shift + column.shift),
         values=_convert(log.path, name, key, values, column, vehicle),
         column=column,
         log_unit=raw.unit,
