@@ -2,6 +2,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy import stats
 from synthetic_rows import GPS, IDEAL, TORQUE, noisy_frame, noisy_rows, row, score
 
 from gripbench.bench.ranking.grids import instruments
@@ -113,8 +114,7 @@ def test_boards_of_gps_and_idealised_methods_are_apart():
     sensors = {"gps": {"sensors": GPS}, "ideal": {"sensors": IDEAL, "idealised": (IDEAL[-1],)}}
     frame = noisy_frame({"plain": 3.0, "gps": 2.0, "ideal": 1.0}, **sensors)
     found = {board.sensors: list(board.lines["label"]) for board in boards(frame)}
-    assert found == {
-        instruments(TORQUE): ["plain"],
+    assert found == {  # alone with its sensors, `plain` stands on the larger boards only
         instruments(GPS): ["gps", "plain"],
         instruments(IDEAL): ["ideal", "plain"],
     }
@@ -131,7 +131,7 @@ def test_boards_of_gps_and_idealised_methods_are_apart():
 
 def test_boards_of_targets_are_apart():
     rows = noisy_rows({"a": 1.0, "b": 2.0}) + noisy_rows(
-        {"c": 2.0, "d": 1.0}, c={"target": "force_x_front"}, d={"target": "force_x_front"}
+        {"c": 2e3, "d": 1e3}, c={"target": "force_x_front"}, d={"target": "force_x_front"}
     )
     found = {board.target: list(board.lines["label"]) for board in boards(frame_of(rows))}
     assert found == {"force_x_front": ["d", "c"], "mu_front": ["a", "b"]}
@@ -208,7 +208,8 @@ def test_scenario_that_lacks_a_method_s_sensors_is_no_failure_of_it():
     rows = noisy_rows({"a": 2.0}, seeds=4, scenarios=("step", "hill"))
     rows += noisy_rows({"g": 1.0}, seeds=4, scenarios=("step",), g={"sensors": GPS})
     rows += [row("g", seed, None, "hill", status="skipped", sensors=GPS) for seed in range(4)]
-    plain, with_gps = boards(frame_of(rows))
+    (with_gps,) = boards(frame_of(rows))
+    (plain,) = boards(frame_of(rows), sensors=instruments(TORQUE))
     assert plain.scenarios == ("hill", "step")
     assert with_gps.scenarios == ("step",)
     assert list(with_gps.lines["label"]) == ["g", "a"]
@@ -266,3 +267,78 @@ def test_bad_input_names_what_would_be_right():
         rank(frame_of(blind), sensors="any")
     with pytest.raises(InputError, match="'a' has two rows for seed 0 of 'step'"):
         rank(frame_of([row("a", 0, 1.0), row("a", 0, 2.0)]))
+
+
+def test_skill_is_against_the_best_guess_of_the_same_sensors():
+    guesses = {"zero": {"baseline": True, "sensors": ()}, "held": {"baseline": True}}
+    frame = noisy_frame({"a": 1.0, "b": 3.0, "zero": 2.5, "held": 2.0}, spread=0.0, **guesses)
+    board = boards(frame)[0]
+    lines = board.lines.set_index("label")
+    assert board.guess == "held"
+    assert lines.loc["a", "skill"] == pytest.approx(0.5)
+    assert lines.loc["held", "skill"] == 0.0
+    assert lines.loc["b", "skill"] == pytest.approx(-0.5)
+    assert list(lines["verdict"]) == ["", "", "", "no better than a guess"]
+    assert lines.loc["a", "beats_guess"] == 1.0
+    assert lines.loc["b", "worse_than_guess"] == "hill, step"
+    assert lines.loc["a", "beats_next"] == 1.0
+    assert boards(frame, labels=["a", "b"])[0].guess == ""
+
+
+def test_a_guess_that_lacks_a_sensor_takes_no_scenario_away():
+    rows = noisy_rows({"a": 1.0, "b": 2.0})
+    rows += [row("held", seed, 3.0, "step", baseline=True) for seed in range(20)]
+    rows += [row("held", seed, None, "hill", status="skipped", baseline=True) for seed in range(20)]
+    board = boards(frame_of(rows))[0]
+    assert board.scenarios == ("hill", "step")
+    assert list(board.lines["label"]) == ["a", "b"]
+
+
+def test_a_cell_exact_to_rounding_does_not_dominate():
+    """Exact in one scenario and bad in two is not better than good in all three."""
+    rows = []
+    for seed in range(12):
+        for scenario, lucky in (("one", 1e-15), ("two", 0.3), ("three", 0.3)):
+            rows.append(row("lucky", seed, lucky * (1.0 + 0.01 * seed), scenario))
+            rows.append(row("good", seed, 0.03 * (1.0 + 0.01 * seed), scenario))
+    assert list(rank(frame_of(rows))["label"]) == ["good", "lucky"]
+
+
+def test_a_stray_run_moves_nobody():
+    rows = noisy_rows({"a": 1.0, "b": 2.0, "c": 3.0})
+    alone = rank(frame_of(rows))
+    rows += [row("c", seed, 0.1, "elsewhere") for seed in range(20)]
+    board = boards(frame_of(rows))[0]
+    assert board.lines.equals(alone)
+    assert board.notes == ("Left out: elsewhere, in which 1 of 3 methods ran.",)
+
+
+def test_levels_and_suites_never_share_a_board():
+    names = ("step", "step@1", "friction_step", "friction_step@1")
+    found = boards(noisy_frame({"a": 1.0, "b": 2.0}, scenarios=names, seeds=3))
+    assert {board.scenarios for board in found} == {(name,) for name in names}
+    titles = {board.title.rpartition(" (")[2].rstrip(")") for board in found}
+    assert {"longitudinal", "longitudinal_population", "level 1"} <= titles
+
+
+def test_rows_of_two_versions_of_a_scenario_are_refused():
+    rows = [row("a", seed, 1.0, world="old") for seed in range(3)]
+    rows += [row("b", seed, 2.0, world="new") for seed in range(3)]
+    with pytest.raises(InputError, match="rows of 'step' come from 2 versions") as caught:
+        rank(frame_of(rows))
+    assert "\n" not in str(caught.value)
+
+
+def test_the_score_in_another_scenario_is_student_over_scenarios():
+    scenarios = ("one", "two", "three", "four")
+    rows = []
+    for seed in range(12):
+        for number, scenario in enumerate(scenarios):
+            rows.append(row("a", seed, 1.0, scenario))
+            rows.append(row("b", seed, 2.0 + number, scenario))
+    line = rank(frame_of(rows), reference="a").set_index("label").loc["b"]
+    logs = np.log([2.0, 3.0, 4.0, 5.0])
+    width = stats.t.ppf(0.975, 3) * logs.std(ddof=1) / 2.0
+    assert line["elsewhere_to"] == pytest.approx(np.exp(logs.mean() + width))
+    assert line["elsewhere_from"] == pytest.approx(np.exp(logs.mean() - width))
+    assert line["score_from"] == pytest.approx(line["score_to"])

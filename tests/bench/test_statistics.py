@@ -1,5 +1,6 @@
 import math
 
+import interval_coverage
 import numpy as np
 import pytest
 from hypothesis import given
@@ -204,41 +205,64 @@ def test_pooled_rms_interval_covers_and_narrows():
         squares = 100.0 * 4.0 * rng.chisquare(10, 20) / 10
         low, high = statistics.pooled_rms_interval(squares, np.full(20, 100.0), resamples=400)
         covered += low <= 2.0 <= high
-    # with 20 runs BCa covers a little less than it says
-    assert stats.binom.ppf(0.001, trials, 0.90) <= covered <= stats.binom.ppf(0.999, trials, 0.97)
+    assert covered >= stats.binom.ppf(0.001, trials, 0.93)
     squares = 400.0 * rng.chisquare(10, 2000) / 10
     low, high = statistics.pooled_rms_interval(squares, np.full(2000, 100.0), resamples=400)
     assert 1.9 < low < 2.0 < high < 2.1
 
 
-@pytest.mark.parametrize("tail", [20.0, 0.7])
-def test_pooled_rms_interval_is_the_bca_of_scipy(tail):
-    rng = np.random.default_rng(3)
-    counts = rng.integers(100, 300, 40).astype(float)
-    squares = counts * rng.gamma(tail, 1.0, 40)
-    found = statistics.pooled_rms_interval(squares, counts, resamples=20_000)
-    reference = stats.bootstrap(
-        (squares, counts),
-        lambda s, n, axis: np.sqrt(s.sum(axis=axis) / n.sum(axis=axis)),
-        paired=True,
-        method="BCa",
-        n_resamples=20_000,
-        rng=np.random.default_rng(1),
-    ).confidence_interval
-    assert found == pytest.approx((reference.low, reference.high), rel=0.01)
+@pytest.mark.parametrize(
+    ("name", "runs"),
+    [
+        ("noise alone: chi-square, 30 degrees of freedom", 10),
+        ("one cause: chi-square, 1", 10),
+        ("one cause: chi-square, 1", 20),
+        ("RMS lognormal, factor e^0.5", 10),
+        ("RMS lognormal, factor e^0.5", 20),
+    ],
+)
+def test_the_interval_of_the_pooled_rms_covers_it(name, runs):
+    """With 300 intervals a coverage of 93 % is seen as at least 89 % in 99.9 of 100 tries."""
+    draw, mean = interval_coverage.LAWS[name]
+    share, _ = interval_coverage.coverage(draw, mean, runs, 300)
+    assert share >= 0.89
 
 
-def test_pooled_rms_interval_where_one_run_outweighs_all():
+def test_the_interval_of_the_pooled_rms_is_that_of_normal_theory_with_many_runs():
+    squares = np.random.default_rng(2).chisquare(30, 4000)
+    low, high = statistics.pooled_rms_interval(squares, np.ones(4000))
+    width = stats.norm.isf(0.05 / 3.0) * math.sqrt(2.0 / 30.0 / 4000)
+    assert math.log(high / low) == pytest.approx(width, rel=0.05)
+
+
+def test_where_one_run_outweighs_all_there_is_no_interval():
     squares = np.ones(100)
     squares[7] = 1e12
     low, high = statistics.pooled_rms_interval(squares, np.full(100, 10.0))
-    assert 0.0 < low <= math.sqrt(squares.sum() / 1000.0) <= high
+    assert math.isnan(low) == math.isnan(high)
+    assert not high < math.sqrt(1e12 / 1000.0)
 
 
-def test_pooled_rms_interval_of_degenerate_runs():
-    assert all(map(math.isnan, statistics.pooled_rms_interval([4.0], [1.0])))
-    assert statistics.pooled_rms_interval([4.0, 8.0], [1.0, 2.0]) == (2.0, 2.0)
-    assert statistics.pooled_rms_interval([0.0, 0.0], [1.0, 2.0]) == (0.0, 0.0)
+def test_the_interval_of_few_or_equal_runs():
+    assert all(map(math.isnan, statistics.pooled_rms_interval(np.ones(9), np.ones(9))))
+    assert statistics.pooled_rms_interval(4.0 * np.ones(10), np.ones(10)) == (2.0, 2.0)
+
+
+def test_few_runs_widen_every_interval_by_the_factor_of_an_unbiased_variance():
+    """The bootstrap divides by n: at five runs its standard error is 11 % too small."""
+    logs = np.log([1.0, 1.1, 0.9, 1.2, 0.95])
+    squares = np.exp(2.0 * logs)[None, :, None] * np.ones((1, 5, 2))
+    squares[..., 1] = 1.0
+    scores = statistics.mean_log_rms(squares, np.ones((1, 5, 2)), resamples=200_000)
+    mean_square = squares[0, :, 0]
+    exact = mean_square.std(ddof=1) / math.sqrt(5.0) / mean_square.mean() / 2.0
+    assert scores.standard_errors()[0] == pytest.approx(exact, rel=0.02)
+
+
+def test_a_performance_profile_counts_runs_within_a_factor_of_the_best():
+    rms = np.array([[1.0, 2.0], [3.0, 1.0], [1.0, np.nan], [0.0, 1.0]])
+    found = statistics.performance_profile(rms, np.array([1.0, 2.0, 3.0]))
+    assert found.tolist() == [[0.75, 0.25], [0.75, 0.5], [1.0, 0.5]]
 
 
 def test_pareto_front_of_known_points():

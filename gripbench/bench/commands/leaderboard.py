@@ -33,6 +33,13 @@ def leaderboard(
         Path | None,
         typer.Option(help="JSON of pytest-benchmark for runtimes relative to the reference."),
     ] = None,
+    answer: Annotated[
+        bool,
+        typer.Option(
+            "--answer",
+            help="Only print, in Markdown, which method to take for which road and sensors.",
+        ),
+    ] = False,
     compare: Annotated[
         Path | None,
         typer.Option(help="An earlier leaderboard.json, or its folder; exit 1 on a regression."),
@@ -49,11 +56,13 @@ def leaderboard(
 ) -> None:
     """Build the leaderboard of stored rows; with --compare, fail if a method became worse."""
     from gripbench.bench.catalogue.registry import find_scenario, load_suite
+    from gripbench.bench.publishing.board_tables import answer_table
     from gripbench.bench.publishing.leaderboard import build, read, usual_targets, write
     from gripbench.bench.publishing.regressions import changes_table
     from gripbench.bench.publishing.regressions import compare as compare_leaderboards
-    from gripbench.bench.publishing.tables import format_of, render, show
+    from gripbench.bench.publishing.tables import format_of, markdown, render, show
     from gripbench.bench.publishing.timings import read_timings
+    from gripbench.bench.ranking.answers import answers
     from gripbench.bench.running.store import read_rows
     from gripbench.errors import InputError, unknown
     from gripbench.writing import check_writable, write_atomically
@@ -73,6 +82,9 @@ def leaderboard(
             raise unknown("target", name, known)
     named = known & set(target or (name for each in suites for name in each.targets))
     targets = named or usual_targets(rows)
+    if answer:
+        print(markdown(answer_table(answers(rows, targets or sorted(known - {""})))), end="")
+        return
     relative = read_timings(timings) if timings else None
     current, boards = build(rows, relative, confidence, targets)
     for path in write(out or results, current, boards):

@@ -45,9 +45,12 @@ def rank(
     wins: Annotated[bool, typer.Option("--wins", help="Also who wins against whom.")] = False,
 ) -> None:
     """Rank the methods of stored rows with the confidence that their runs allow."""
+    from textwrap import fill
+
     from gripbench.bench.publishing.board_tables import board_table, wins_table
     from gripbench.bench.publishing.leaderboard import usual_targets
     from gripbench.bench.publishing.tables import show
+    from gripbench.bench.ranking.answers import words
     from gripbench.bench.ranking.ranking import boards
     from gripbench.bench.running.store import read_rows
     from gripbench.errors import InputError
@@ -67,6 +70,8 @@ def rank(
     for number, board in enumerate(found):
         if number:
             print()
+        if format_ in ("terminal", "text", "markdown"):
+            print(fill(words(board), 100) + "\n")
         show(board_table(board, wide=wide), format_)
         if wins:
             print()

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import pandas as pd
 
 from gripbench.bench.publishing.tables import Column, Table
 from gripbench.bench.publishing.timings import RelativeRuntime
+from gripbench.bench.ranking.answers import Answer
 from gripbench.bench.ranking.ranking import Board
+from gripbench.bench.ranking.skill import NO_BETTER
 from gripbench.bench.ranking.summary import FOOTNOTE, marked
 from gripbench.bench.scoring.metric import SIGNAL_UNIT, Metric
 from gripbench.bench.scoring.metrics import metrics
@@ -29,8 +31,39 @@ def board_table(board: Board, timings: Timings | None = None, wide: bool = False
     timings
         Relative runtimes; without them the step times stored with the rows are shown.
     wide
-        With every metric that has a value, quantiles of the step and deadlines.
+        With everything that is known, for files and wide screens: intervals in columns of their
+        own, every metric that has a value, quantiles of the step and deadlines. Otherwise at most
+        nine columns.
     """
+    columns = _wide(board, timings is not None) if wide else _narrow(board)
+    rows = [_row(line, board.target, timings or {}) for line in board.lines.to_dict("records")]
+    return Table(columns, tuple(rows), caption=board.title, notes=_notes(board, wide))
+
+
+def _narrow(board: Board) -> tuple[Column, ...]:
+    """Return the columns that a person needs: at most nine."""
+    unit = signal(board.target).display_unit.replace("-", "")
+    columns = [
+        Column("place", "Rank"),
+        Column("name", "Method"),
+        *((Column("initials", "Reads"),) if not board.sensors else ()),
+        Column("score", "Score", format=".3g", best="lowest", tied="tied"),
+        Column("rms", "RMS", unit, ".3g"),
+        Column("rmses_short", f"{100.0 * board.confidence:g} %"),
+        *(
+            (
+                Column("skill", "Skill", format=".2f"),
+                Column("beats_guess", "> guess", "%", ".0f"),
+            )
+            if board.guess
+            else ()
+        ),
+        Column("beats_next", "> next", "%", ".0f"),
+    ]
+    return tuple(columns)
+
+
+def _wide(board: Board, relative: bool) -> tuple[Column, ...]:
     unit = signal(board.target).display_unit.replace("-", "")
     percent = f"{100.0 * board.confidence:g} %"
     columns = [
@@ -41,29 +74,126 @@ def board_table(board: Board, timings: Timings | None = None, wide: bool = False
         *((Column("reads", "Reads"),) if not board.sensors else ()),
         Column("score", "Score", format=".3f", best="lowest", tied="tied"),
         Column("scores", f"Score ({percent})"),
+        Column("elsewhere", f"Score in another scenario ({percent})"),
         Column("rms", "RMS", unit, ".4g"),
         Column("rmses", f"RMS ({percent})", unit),
-    ]
-    if wide:
-        columns += [
+        Column("skill", "Skill", format=".3f"),
+        Column("beats_guess", "Better than a guess in", "% of drives", ".0f"),
+        Column("beats_next", "Better than the next in", "% of drives", ".0f"),
+        Column("verdict", "Verdict"),
+        Column("worse_than_guess", "Worse than a guess in"),
+        *(
             column
             for metric in metrics().values()
             if metric.name != "rms" and board.lines[metric.name].notna().any()
             for column in _metric_columns(metric, board.target)
-        ]
-    columns += _runtime_columns(timings is not None, wide)
-    columns += [Column("failures", "Failed", format="d")]
+        ),
+        *_runtime_columns(relative),
+        Column("failures", "Failed", format="d"),
+    ]
     if board.lines["failures"].any():
         columns += [Column("reason", "Reason")]
-    rows = [_row(line, board.target, timings or {}) for line in board.lines.to_dict("records")]
+    return tuple(columns)
+
+
+def _notes(board: Board, wide: bool) -> tuple[str, ...]:
+    """Return what stands below a board."""
     notes = [
-        f"{len(board.scenarios)} scenarios, {max(len(board.seeds), 1)} common seeds. Methods that "
-        "share a letter are not separable; a marked score may be the best.",
+        f"{len(board.scenarios)} scenarios, {max(len(board.seeds), 1)} common seeds. A score that "
+        "is marked may be the best; ranks in brackets hold together.",
         *board.notes,
     ]
+    if not wide:
+        if board.guess:
+            notes.append(
+                f"Skill: 1 - score / score of the best guess ({board.guess}); > guess, > next: "
+                "share of drives with less error than that guess, than the line below."
+            )
+        useless = board.lines.loc[board.lines["verdict"] != "", "label"]
+        if len(useless):
+            notes.append(f"{NOT_BETTER} {NO_BETTER}.")
+        failed = board.lines[board.lines["failures"] > 0]
+        notes += [
+            f"{line['label']}: {line['failures']} of {line['cells']} runs failed "
+            f"({line['reason']})."
+            for line in failed.to_dict("records")
+        ]
+        if not board.sensors:
+            used = sorted({name for reads in board.lines["reads"] for name in _instruments(reads)})
+            notes.append("Reads: " + ", ".join(f"{_initial(name)} {name}" for name in used) + ".")
+    if board.lines["baseline"].any():
+        notes.append(f"{GUESS} baseline: a guess or a formula on paper.")
     if board.lines["idealised"].any():
         notes.append(FOOTNOTE + ".")
-    return Table(tuple(columns), tuple(rows), caption=board.title, notes=tuple(notes))
+    return tuple(notes)
+
+
+NOT_BETTER = "–"
+"""Follows the name of a method whose skill is not positive."""
+
+GUESS = "○"
+"""Follows the name of a baseline."""
+
+_INITIALS = {
+    "wheel speed sensor": "W",
+    "torque on the vehicle bus": "T",
+    "accelerometer": "A",
+    "gyroscope": "G",
+    "steering angle sensor": "S",
+    "GPS receiver": "P",
+    "magnetometer": "M",
+    "optical speed sensor": "O",
+    "road grade estimate": "E",
+    "road bank map": "B",
+    "idealised": "†",
+}
+"""Letters of instruments in a narrow table."""
+
+
+def _instruments(reads: str) -> list[str]:
+    return [name for name in reads.split(", ") if name]
+
+
+def _initial(instrument: str) -> str:
+    return _INITIALS.get(instrument, instrument[:1].lower())
+
+
+def answer_table(found: Iterable[Answer]) -> Table:
+    """Return answers as a table: road and sensors, method, error, drives better than a guess."""
+    columns = (
+        Column("target", "Estimate"),
+        Column("road", "Road"),
+        Column("sensors", "Sensors"),
+        Column("method", "Method"),
+        Column("error", "RMS error"),
+        Column("better", "Better than a guess in"),
+    )
+    rows = tuple(_answer(one) for one in found)
+    return Table(
+        columns,
+        rows,
+        caption="Which method for which road and sensors",
+        notes=(
+            "The guess is the best baseline that the same sensors allow. A set of sensors stands "
+            "here where it changes the method; one that adds nothing is left out.",
+        ),
+        group_by="target",
+    )
+
+
+def _answer(one: Answer) -> dict[str, Any]:
+    low, high = (f"{value:.3g}" for value in (one.low, one.high))
+    error = f"{one.error:.3g}" + (f" ({low}–{high})" if low != "nan" else "")
+    better = "no guess was run" if not one.guess else f"{100.0 * one.better:.0f} % of drives"
+    method = one.method if one.useful else f"none: {one.guess} is as good as {one.method}"
+    return {
+        "target": one.target,
+        "road": one.road + (f", {one.plan}" if one.plan and one.road != "real drive" else ""),
+        "sensors": ", ".join(one.sensors),
+        "method": method,
+        "error": f"{error} {one.unit}".rstrip(),
+        "better": better,
+    }
 
 
 def wins_table(board: Board) -> Table:
@@ -84,20 +214,19 @@ def wins_table(board: Board) -> Table:
     )
 
 
-def _runtime_columns(relative: bool, wide: bool) -> list[Column]:
+def _runtime_columns(relative: bool) -> list[Column]:
     if relative:
         columns = [Column("relative", "Step", "reference kernels", ".3g", best="lowest")]
     else:
         columns = [Column("step", "Step", "ns", ".3g", best="lowest")]
-    if wide:
-        columns += [
-            Column("p50", "Online p50", "µs", ".3g"),
-            Column("p99", "p99", "µs", ".3g"),
-            Column("worst", "max", "µs", ".3g"),
-            Column("misses", "Deadlines missed", "%", ".2g"),
-            Column("pareto", "Front"),
-        ]
-    return columns
+    return [
+        *columns,
+        Column("p50", "Online p50", "µs", ".3g"),
+        Column("p99", "p99", "µs", ".3g"),
+        Column("worst", "max", "µs", ".3g"),
+        Column("misses", "Deadlines missed", "%", ".2g"),
+        Column("pareto", "Front"),
+    ]
 
 
 def _metric_columns(metric: Metric, target: str) -> list[Column]:
@@ -123,7 +252,13 @@ def _row(line: Mapping[Any, Any], target: str, timings: Timings) -> dict[str, An
     return {
         **line,
         **_metric_cells(line, target),
-        "name": marked(line["label"], line["idealised"]),
+        "name": _name(line),
+        "place": _place(line),
+        "initials": "".join(sorted(map(_initial, _instruments(line["reads"])))),
+        "beats_guess": _times(line["beats_guess"], 100.0),
+        "beats_next": _times(line["beats_next"], 100.0),
+        "elsewhere": _range(line["elsewhere_from"], line["elsewhere_to"], ".3f"),
+        "rmses_short": _range(factor * line["rms_from"], factor * line["rms_to"], ".3g"),
         "ranks": _range(line["rank_from"], line["rank_to"], "d"),
         "scores": _range(line["score_from"], line["score_to"], ".3f"),
         "rms": _times(line["rms"], factor),
@@ -153,6 +288,20 @@ def _metric_cells(line: Mapping[Any, Any], target: str) -> dict[str, Any]:
         if metric.reached:
             cells[metric.reached] = _times(line[metric.reached], 100.0)
     return cells
+
+
+def _name(line: Mapping[Any, Any]) -> str:
+    """Return a method's label with the marks that stand below the table."""
+    marks = (GUESS if line["baseline"] else "") + (NOT_BETTER if line["verdict"] else "")
+    name = marked(line["label"], line["idealised"])
+    return f"{name} {marks}" if marks else name
+
+
+def _place(line: Mapping[Any, Any]) -> str:
+    """Return the rank with the ranks that it may have."""
+    if line["rank_from"] == line["rank_to"]:
+        return str(line["rank"])
+    return f"{line['rank']} ({line['rank_from']}–{line['rank_to']})"
 
 
 def _range(low: float, high: float, format_spec: str) -> str | None:

@@ -18,9 +18,10 @@ from pydantic import Field
 
 import gripbench
 from gripbench.bench.catalogue.registry import load_suite, suite_files
-from gripbench.bench.publishing.board_tables import Timings, board_table
-from gripbench.bench.publishing.tables import markdown
+from gripbench.bench.publishing.board_tables import Timings, answer_table, board_table
+from gripbench.bench.publishing.tables import Table, markdown
 from gripbench.bench.publishing.timings import RelativeRuntime
+from gripbench.bench.ranking.answers import Answer, answers, words
 from gripbench.bench.ranking.grids import ANY
 from gripbench.bench.ranking.ranking import Board, boards
 from gripbench.bench.ranking.statistics import CONFIDENCE
@@ -64,6 +65,9 @@ class Leaderboard(Configuration):
         Version that made it.
     confidence
         Confidence of its ranks and intervals.
+    answers
+        Which method for which road and sensors: the fields of
+        `gripbench.bench.ranking.answers.Answer`.
     boards
         Each board: target, sensors, title, scenarios, seeds, notes, and its `methods`, one
         mapping a line with the columns of `gripbench.bench.ranking.ranking.columns`.
@@ -76,9 +80,22 @@ class Leaderboard(Configuration):
     schema_version: int = SCHEMA_VERSION
     gripbench: str
     confidence: float
+    answers: tuple[dict[str, Any], ...] = ()
     boards: tuple[dict[str, Any], ...]
     runtimes: dict[str, dict[str, RelativeRuntime]] = Field(default_factory=dict)
     runs: tuple[Runs, ...]
+
+    def answers_found(self) -> list[Answer]:
+        """Return the answers as they were made."""
+        return [
+            Answer(
+                **{
+                    key: math.nan if value is None else value
+                    for key, value in {**one, "sensors": tuple(one["sensors"])}.items()
+                }
+            )
+            for one in self.answers
+        ]
 
 
 def usual_targets(rows: pd.DataFrame) -> list[str]:
@@ -124,6 +141,10 @@ def build(
         Leaderboard(
             gripbench=gripbench.__version__,
             confidence=confidence,
+            answers=tuple(
+                {key: _plain(value) for key, value in vars(one).items()}
+                for one in answers(rows, sorted(set(rows["target"]) - {""}))
+            ),
             boards=tuple(_content(board) for board in found),
             runtimes={label: dict(forms) for label, forms in (timings or {}).items()},
             runs=tuple(runs_of(rows)),
@@ -182,26 +203,33 @@ def read(path: Path) -> Leaderboard:
 
 
 def text_of(leaderboard: Leaderboard, found: list[Board]) -> str:
-    """Return the leaderboard as Markdown."""
-    timings = leaderboard.runtimes or None
+    """Return the leaderboard as Markdown: the answers, then each board with its own in words."""
     parts = [
         "# Leaderboard",
         "",
-        f"gripbench {leaderboard.gripbench}. One board for each target and each set of instruments "
-        "that a method may read, then one with all methods and what they read. Score: geometric "
-        "mean over the scenarios of the pooled RMS, 1 is typical of the board; ranks and intervals "
-        f"hold with {100 * leaderboard.confidence:g} % (paired over common seeds, bootstrap over "
-        "runs, Holm's correction). Failures rank last.",
+        f"gripbench {leaderboard.gripbench}. {ANSWER_TITLE}",
+        "",
+        _without_caption(answer_table(leaderboard.answers_found())),
+        "",
+        "One board for each target and each set of instruments that a method may read, then one "
+        "with all methods and what they read. Score: geometric mean over the scenarios of the "
+        "pooled RMS, 1 is typical of the board; ranks and intervals hold with "
+        f"{100 * leaderboard.confidence:g} % (paired over common seeds, bootstrap over runs, "
+        "Holm's correction). Failures rank last. `leaderboard.csv` and `gripbench rank --wide` "
+        "have every column.",
         "",
     ]
     for board in found:
-        parts += [f"## {board.title}", "", _without_caption(board, timings), ""]
+        table = _without_caption(board_table(board, leaderboard.runtimes or None))
+        parts += [f"## {board.title}", "", f"**{words(board)}**", "", table, ""]
     return "\n".join(parts).rstrip() + "\n"
 
 
-def _without_caption(board: Board, timings: Timings | None) -> str:
-    text = markdown(board_table(board, timings, wide=True))
-    return text.removeprefix(board.title).strip()
+ANSWER_TITLE = "Which method for which road and sensors:"
+
+
+def _without_caption(table: Table) -> str:
+    return markdown(table).removeprefix(table.caption).strip()
 
 
 def _json(content: dict[str, Any]) -> str:

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
+from gripbench.bench.ranking.plans import plan_of
 from gripbench.bench.running.recorded_scenarios import PREFIX
 from gripbench.envs.signals import SIGNALS, signal
 from gripbench.errors import InputError, unknown
@@ -82,9 +83,32 @@ def instruments(channels: str | Iterable[str]) -> tuple[str, ...]:
 
 
 def sensor_sets(rows: pd.DataFrame) -> list[tuple[str, ...]]:
-    """Return the different sets of instruments that the methods of these rows read."""
-    found = {instruments(channels) for channels in rows["sensors"].unique()}
-    return sorted(found, key=lambda names: (len(names), names))
+    """Return the sets of instruments that have a board of their own, the smallest first.
+
+    Each set that a method reads, but for those that tell nothing of their own: with fewer than two
+    methods besides baselines, or with the same ones as a larger set. Their methods stand on the
+    boards of the larger sets.
+    """
+    readers: dict[tuple[str, ...], set[str]] = {}
+    for (channels, label), part in rows.groupby(["sensors", "label"]):
+        own = readers.setdefault(instruments(channels), set())
+        if not part["baseline"].any():
+            own.add(str(label))
+    sets = sorted(readers, key=lambda names: (len(names), names))
+    on_it = {names: _union(readers[less] for less in sets if set(less) <= set(names))
+             for names in sets}  # fmt: skip
+    kept = []
+    for names in sets:
+        larger = [other for other in sets if set(names) < set(other)]
+        told = len(on_it[names]) > 1 and all(on_it[names] != on_it[other] for other in larger)
+        if told or not larger:
+            kept.append(names)
+    real = [names for names in kept if on_it[names]]
+    return real or kept
+
+
+def _union(groups: Iterable[set[str]]) -> frozenset[str]:
+    return frozenset().union(*groups)
 
 
 def chosen_instruments(given: str | Iterable[str]) -> tuple[str, ...]:
@@ -113,10 +137,10 @@ def on_board(
     left out: that is not the method's failure, and an easier set of scenarios no merit. Each part
     comes with notes on what was left out.
 
-    Methods that share no scenario, not even by way of others, come in different parts: those of
-    a longitudinal and of a lateral suite that estimate the same signal, say. Being skipped in a
-    scenario does not count as sharing it. Each recording of a real vehicle is a part of its own:
-    its runs are windows of one drive, which have no counterpart in another scenario.
+    Each plan (a suite, a level, a recording, see `ranking.plans`) is a part of its own, and so
+    are methods of one plan that share no scenario, not even by way of others. Being skipped in a
+    scenario does not count as sharing it. A scenario in which fewer than half of the methods of a
+    part were run is left out of it: a stray run moves nobody behind.
 
     Parameters
     ----------
@@ -130,7 +154,8 @@ def on_board(
     Raises
     ------
     InputError
-        If no method estimates the target with these instruments, or every run was skipped.
+        If no method estimates the target with these instruments, every run was skipped, or rows
+        of a scenario come from two versions of it.
     """
     lines = rows[rows["target"] == target]
     if allowed is not None:
@@ -141,22 +166,59 @@ def on_board(
     ran = lines[lines["status"] != "skipped"]
     if ran.empty:
         raise InputError(f"{target}: every run was skipped")
+    _check_worlds(ran, target)
     homes = ran.groupby("label")["scenario"].agg(set)
-    real = {name for name in ran["scenario"].unique() if name.startswith(PREFIX)}
-    simulated = _connected(home - real for home in homes if home - real)
+    plans: dict[str, set[str]] = {}
+    for name in ran["scenario"].unique():
+        plans.setdefault(plan_of(str(name)), set()).add(str(name))
     parts = []
-    for scenarios in [*simulated, *({name} for name in sorted(real))]:
-        part = lines[lines["scenario"].isin(scenarios)]
-        # what is at home in another part is a stranger here
-        elsewhere = {label for label, home in homes.items() if not home & scenarios}
-        if scenarios <= real:  # what lacks the sensors of the one drive has no place on its board
-            elsewhere |= set(part["label"]) - set(homes.index)
-        parts.append(_where_all_run(part[~part["label"].isin(elsewhere)], set(homes.index)))
+    for plan, members in sorted(plans.items()):
+        inside = (home & members for home in homes if home & members)
+        for scenarios in _connected(inside):
+            part = lines[lines["scenario"].isin(scenarios)]
+            # what is at home in another part is a stranger here
+            elsewhere = {label for label, home in homes.items() if not home & scenarios}
+            if plan.startswith(PREFIX):  # what lacks the one drive's sensors has no place there
+                elsewhere |= set(part["label"]) - set(homes.index)
+            part = part[~part["label"].isin(elsewhere)]
+            part, strays = _without_strays(part)
+            part, notes = _where_all_run(part, set(homes.index))
+            parts.append((part, [*strays, *notes]))
     return parts
 
 
+def _check_worlds(ran: pd.DataFrame, target: str) -> None:
+    """Raise InputError where rows of one scenario come from two versions of it."""
+    for scenario, part in ran[ran["status"] == "ok"].groupby("scenario"):
+        worlds = {str(world): sorted(set(rows["label"])) for world, rows in part.groupby("world")}
+        if len(worlds) > 1:
+            groups = sorted(worlds.values(), key=len)
+            raise InputError(
+                f"{target}: rows of '{scenario}' come from {len(worlds)} versions of the scenario "
+                f"or of the scoring ({groups[0][0]} has another one than {groups[-1][0]}); run it "
+                "again for all of them: 'gripbench run' replaces what is out of date"
+            )
+
+
+def _without_strays(part: pd.DataFrame) -> tuple[pd.DataFrame, list[str]]:
+    """Leave out scenarios in which fewer than half of the methods were run."""
+    tried = part[~part["baseline"].astype(bool)].groupby("scenario")["label"].nunique()
+    everyone = part.loc[~part["baseline"].astype(bool), "label"].nunique()
+    strays = sorted(name for name in tried.index if 2 * tried[name] < everyone)
+    left_out = [
+        f"Left out: {name}, in which {tried[name]} of {everyone} methods ran." for name in strays
+    ]
+    return part[~part["scenario"].isin(strays)], left_out
+
+
 def _where_all_run(part: pd.DataFrame, ran: set[str]) -> tuple[pd.DataFrame, list[str]]:
-    """Leave out the scenarios in which a method was skipped that ran elsewhere."""
+    """Leave out the scenarios in which a method was skipped that ran elsewhere.
+
+    A baseline that was skipped somewhere goes itself: it takes no scenario away from the others.
+    """
+    blind = part["baseline"].astype(bool) & (part["status"] == "skipped")
+    rest = part[~part["label"].isin(part.loc[blind, "label"])]
+    part = part if rest.empty else rest
     skipped = part[(part["status"] == "skipped") & part["label"].isin(ran)]
     left_out = sorted(skipped["scenario"].unique())
     rest = part[~part["scenario"].isin(left_out)]

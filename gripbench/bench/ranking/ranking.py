@@ -30,14 +30,21 @@ from gripbench.bench.ranking.grids import (
     sensor_sets,
 )
 from gripbench.bench.ranking.pareto import pareto_front
+from gripbench.bench.ranking.plans import plan_of
+from gripbench.bench.ranking.resolution import resolution
+from gripbench.bench.ranking.skill import against_guess, best_baseline
+from gripbench.bench.running.recorded_scenarios import PREFIX
 from gripbench.bench.scoring.metric import Metric, pooled_rms
 from gripbench.bench.scoring.metrics import metrics
 from gripbench.errors import InputError, unknown
 
 _BEFORE = (
     "target", "sensors", "rank", "rank_from", "rank_to", "group", "label", "method", "variant",
-    "title", "reads", "idealised", "score", "score_from", "score_to", "rms", "rms_from", "rms_to",
+    "title", "reads", "idealised", "baseline", "score", "score_from", "score_to", "elsewhere_from",
+    "elsewhere_to", "skill", "verdict", "beats_guess", "beats_next", "worse_than_guess",
+    "rms", "rms_from", "rms_to",
 )  # fmt: skip
+_SCORES = ("score", "score_from", "score_to", "elsewhere_from", "elsewhere_to")
 _BEHIND = (
     "step_batch", "step_p50", "step_p99", "step_max", "deadline_misses", "pareto",
     "failures", "reason", "cells", "seeds", "scenarios",
@@ -78,6 +85,8 @@ class Board:
         Seeds common to all methods.
     lines
         One line a method from best to worst, with `columns()`.
+    guess
+        The best baseline that these instruments allow; empty: none was run.
     p_better
         Adjusted p-value that the method of the row has a lower RMS than that of the column.
     wins
@@ -94,6 +103,7 @@ class Board:
     scenarios: tuple[str, ...]
     seeds: tuple[int, ...]
     lines: pd.DataFrame
+    guess: str
     p_better: pd.DataFrame
     wins: pd.DataFrame
     notes: tuple[str, ...]
@@ -214,7 +224,10 @@ def _board(
 ) -> Board:
     target = grid.target
     scenarios = tuple(sorted((*grid.scenarios, *grid.single)))
-    title = f"{target} with {'any sensors' if allowed is None else ', '.join(allowed)}"
+    with_ = "any sensors" if allowed is None else ", ".join(allowed) or "no sensors"
+    plan = plan_of(scenarios[0]) if scenarios else ""
+    named = bool(plan) and not plan.startswith(PREFIX)
+    title = f"{target} with {with_}" + (f" ({plan})" if named else "")
     ranks, p_better = _ranks(grid, settings)
     lines = pd.DataFrame(
         [
@@ -228,22 +241,24 @@ def _board(
     lines["seeds"] = len(grid.seeds) or 1
     lines["scenarios"] = len(grid.scenarios) + len(grid.single)
     lines["pareto"] = pareto_front(lines["score"], lines["step_batch"])
-    lines = lines[list(columns())].sort_values(["rank", "label"], ignore_index=True)
+    lines = lines.sort_values(["rank", "label"], ignore_index=True)
     order = list(lines["label"])
     runs = grid.rows.assign(rms=grid.rows["rms"].where(grid.rows["status"] == "ok"))
     matrix = runs.pivot_table(
         index=["scenario", "seed"], columns="label", values="rms", dropna=False
     ).reindex(columns=order)
     wins = statistics.wins(matrix.to_numpy(float))
+    lines = against_guess(lines, matrix, wins, grid)[list(columns())]
     complete = [label for label in order if label in grid.labels]
     return Board(
         target=target,
         sensors=allowed or (),
-        title=title + (f" in {', '.join(scenarios)}" if one_of_several else ""),
+        title=title + (f" in {', '.join(scenarios)}" if one_of_several and not named else ""),
         confidence=settings.confidence,
         scenarios=scenarios,
         seeds=grid.seeds,
         lines=lines,
+        guess=best_baseline(lines),
         p_better=p_better.reindex(index=complete, columns=complete),
         wins=pd.DataFrame(wins, index=order, columns=order),
         notes=grid.notes,
@@ -262,6 +277,7 @@ def _ranks(grid: Grid, settings: _Settings) -> tuple[dict[str, dict[str, Any]], 
             grid.single_rms,
             settings.resamples,
             settings.seed,
+            resolution(grid.target),
         )
         p = statistics.adjusted_p_better(scores)
         better = p <= 1.0 - settings.confidence
@@ -269,7 +285,7 @@ def _ranks(grid: Grid, settings: _Settings) -> tuple[dict[str, dict[str, Any]], 
         first, last = statistics.rank_intervals(better)
         groups = statistics.tied_groups(better, order)
         places = _places(scores.estimate, order)
-        score, low, high = _relative(scores, labels, settings)
+        score, low, high, far_low, far_high = _relative(scores, labels, settings)
         for i, label in enumerate(labels):
             by_label[label] = {
                 "rank": places[i],
@@ -279,6 +295,8 @@ def _ranks(grid: Grid, settings: _Settings) -> tuple[dict[str, dict[str, Any]], 
                 "score": score[i],
                 "score_from": low[i],
                 "score_to": high[i],
+                "elsewhere_from": far_low[i],
+                "elsewhere_to": far_high[i],
                 "failures": 0,
             }
     elif settings.reference:
@@ -291,7 +309,7 @@ def _ranks(grid: Grid, settings: _Settings) -> tuple[dict[str, dict[str, Any]], 
             "rank_from": len(labels) + 1,
             "rank_to": everyone,
             "group": "",
-            **dict.fromkeys(("score", "score_from", "score_to"), np.nan),
+            **dict.fromkeys(_SCORES, np.nan),
             "failures": failures,
         }
     return by_label, pd.DataFrame(p, index=list(labels), columns=list(labels))
@@ -310,7 +328,11 @@ def _places(estimate: npt.NDArray[np.float64], order: npt.NDArray[np.int64]) -> 
 def _relative(
     scores: statistics.Scores, labels: tuple[str, ...], settings: _Settings
 ) -> tuple[npt.NDArray[np.float64], ...]:
-    """Return scores relative to the reference with the ends of their intervals."""
+    """Return scores relative to the reference with the ends of both their intervals.
+
+    The first interval is over other runs of these scenarios; the second over other scenarios of
+    their kind, from the scatter of the scenarios themselves.
+    """
     if settings.reference and settings.reference not in labels:
         raise unknown("reference on the board", settings.reference, labels)
     chosen = [labels.index(settings.reference)] if settings.reference else slice(None)
@@ -319,7 +341,11 @@ def _relative(
     relative = scores.estimate - shift
     errors = scores.standard_errors(base)
     low, high = statistics.interval(relative, errors, scores.runs, settings.confidence)
-    return np.exp(relative), np.exp(low), np.exp(high)
+    each = scores.by_scenario - scores.by_scenario[:, chosen].mean(axis=1, keepdims=True)
+    number = len(each)
+    scatter = each.std(axis=0, ddof=1) / np.sqrt(number) if number > 1 else np.zeros_like(relative)
+    far = statistics.interval(relative, scatter, number, settings.confidence)
+    return tuple(np.exp(values) for values in (relative, low, high, *far))
 
 
 def _summary(group: pd.DataFrame, complete: bool, settings: _Settings) -> dict[str, Any]:
@@ -336,7 +362,8 @@ def _summary(group: pd.DataFrame, complete: bool, settings: _Settings) -> dict[s
         settings.seed,
     )
     line: dict[str, Any] = {
-        name: first[name] for name in ("label", "method", "variant", "title", "idealised")
+        name: first[name]
+        for name in ("label", "method", "variant", "title", "idealised", "baseline")
     }
     line |= {
         "reads": ", ".join(instruments(first["sensors"])),

@@ -245,6 +245,7 @@ def _row(cell: Cell, targets: tuple[str, ...], status: Status, reason: str) -> R
         variant=declaration.variant,
         label=cell.method.label,
         parameters=declaration.settings,
+        baseline=declaration.baseline,
         sensors=declaration.sensors,
         idealised=declaration.idealised,
         targets=targets,

@@ -70,6 +70,8 @@ class Row(Configuration):
         the overridden parameters where there are any.
     parameters
         Every setting of the method by name.
+    baseline
+        Whether it is a guess or a textbook formula that methods are measured by.
     sensors, idealised
         Channels that it reads, and those of them that no sensor in a vehicle gives.
     targets
@@ -102,6 +104,7 @@ class Row(Configuration):
     variant: str = ""
     label: str
     parameters: dict[str, float | Text | bool | None] = Field(default_factory=dict)
+    baseline: bool = False
     sensors: tuple[str, ...] = ()
     idealised: tuple[str, ...] = ()
     targets: tuple[str, ...] = ()
@@ -223,7 +226,8 @@ def frame_of(rows: Iterable[Row]) -> pd.DataFrame:
     A row that is not `ok` has a line with NaN scores for each of its targets, so that no failure
     vanishes from a table made of the frame. Columns: `scenario, seed, label, method, variant,
     title, target, status, reason`, the columns of each metric, `sample_period, step_batch,
-    step_p50, step_p99, step_max, deadline_misses, sensors, idealised, parameters, key`.
+    step_p50, step_p99, step_max, deadline_misses, sensors, idealised, parameters, baseline,
+    world, key`.
 
     A metric has a column of its name; one that is pooled by totals also `<name>_total` and
     `<name>_count`, which for the RMS are called `sum_of_squares` and `count`. NaN: the metric has
@@ -252,7 +256,7 @@ def frame_of(rows: Iterable[Row]) -> pd.DataFrame:
 _COMMON = (
     "scenario", "seed", "label", "method", "variant", "title", "status", "reason",
     "sample_period", "step_batch", "step_p50", "step_p99", "step_max", "deadline_misses",
-    "sensors", "idealised", "parameters", "key",
+    "sensors", "idealised", "parameters", "baseline", "world", "key",
 )  # fmt: skip
 
 
@@ -276,6 +280,8 @@ def _common_columns(row: Row) -> dict[str, Any]:
         "sensors": " ".join(row.sensors),
         "idealised": " ".join(row.idealised),
         "parameters": " ".join(f"{name}={value}" for name, value in row.parameters.items()),
+        "baseline": row.baseline,
+        "world": row.world,
         "key": row.key,
     }
 

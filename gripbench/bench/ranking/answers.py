@@ -1,0 +1,166 @@
+"""Rows and boards in; in words and as a table, which method to take, how good it is, how sure out.
+
+The answer of a board is its best method that a vehicle could run: no baseline, and none that
+reads a channel which no sensor gives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import pandas as pd
+
+from gripbench.bench.ranking.plans import plan_of, road_of
+from gripbench.bench.ranking.ranking import Board, boards
+from gripbench.envs.signals import signal
+from gripbench.errors import InputError
+
+ROADS = ("dry", "wet", "snow", "ice", "changing", "real drive", "unknown")
+"""Kinds of road in the order of the table."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Which method to take for one target on one kind of road with one set of sensors.
+
+    Attributes
+    ----------
+    target, plan, road, sensors
+        The question; `plan` is the suite, or empty.
+    method
+        Label of the best method, empty where there is none.
+    guess
+        Label of the best baseline, empty where none was run.
+    error, low, high
+        Its pooled RMS with interval, in the unit in which people see the target.
+    unit
+        That unit.
+    better
+        Share of the drives in which it is better than the best baseline; NaN without one.
+    skill
+        One less its error over that of the best baseline; NaN without one.
+    drives
+        Number of drives.
+    """
+
+    target: str
+    plan: str
+    road: str
+    sensors: tuple[str, ...]
+    method: str
+    guess: str
+    error: float
+    low: float
+    high: float
+    unit: str
+    better: float
+    skill: float
+    drives: int
+
+    @property
+    def useful(self) -> bool:
+        """Whether the method is better than a guess, or there is no guess to compare with."""
+        return not self.skill <= 0.0
+
+
+def best_line(board: Board) -> Any | None:
+    """Return the line of the method that a board recommends, None where it has none."""
+    lines = board.lines
+    real = lines[~lines["baseline"].astype(bool) & (lines["idealised"] == "")]
+    real = real[real["score"].notna()]
+    return None if real.empty else real.iloc[0]
+
+
+def words(board: Board) -> str:
+    """Return in words what a board says."""
+    shown = signal(board.target)
+    line = best_line(board)
+    if line is None:
+        return "No method that a vehicle could run finished every drive."
+    with_ = "With any sensors" if line["sensors"] == "any" else f"With {line['sensors']}"
+    unit = "" if shown.display_unit == "-" else f" {shown.display_unit}"
+    factor = shown.display_factor
+    error = f"{factor * line['rms']:.3g}{unit} RMS"
+    if pd.notna(line["rms_from"]):
+        ends = (factor * line["rms_from"], factor * line["rms_to"])
+        error += f" ({100 * board.confidence:g} %: {ends[0]:.3g} to {ends[1]:.3g})"
+    drives = int(line["cells"])
+    parts = [f"{with_} take {line['label']}: {error} over {drives} drives"]
+    order = list(board.lines["label"])
+    place = order.index(line["label"])
+    if pd.notna(line["beats_next"]) and order[place + 1] != board.guess:
+        parts.append(f"better than {order[place + 1]} in {100 * line['beats_next']:.0f} % of them")
+    if board.guess:
+        parts.append(
+            f"better than the guess {board.guess} in {100 * line['beats_guess']:.0f} % of them"
+        )
+    text = ", ".join(parts) + "."
+    if line["verdict"]:
+        text += f" It is {line['verdict']}: {board.guess} is as good."
+    elif line["worse_than_guess"]:
+        text += f" Worse than that guess in {line['worse_than_guess']}."
+    useless = board.lines[board.lines["verdict"] != ""]
+    others = [name for name in useless["label"] if name != line["label"]]
+    if others:
+        text += f" No better than a guess: {', '.join(others)}."
+    return text
+
+
+def answers(rows: pd.DataFrame, targets: Iterable[str]) -> list[Answer]:
+    """Return the answers for every target, plan, kind of road and set of sensors.
+
+    A set of sensors is left out where a smaller one gives the same method: what it adds is not
+    used.
+
+    Parameters
+    ----------
+    rows
+        Frame as `gripbench.bench.running.rows.frame_of` returns it.
+    targets
+        Signals that are estimated.
+    """
+    found: list[Answer] = []
+    for target in targets:
+        ran = rows[(rows["target"] == target) & (rows["status"] != "skipped")]
+        roads = {name: (plan_of(name), road_of(name)) for name in ran["scenario"].unique()}
+        kinds = sorted(set(roads.values()), key=lambda kind: (kind[0], ROADS.index(kind[1])))
+        for kind in kinds:
+            names = [name for name, its in roads.items() if its == kind]
+            found += _of_road(rows[rows["scenario"].isin(names)], target, *kind)
+    return found
+
+
+def _of_road(rows: pd.DataFrame, target: str, plan: str, road: str) -> list[Answer]:
+    try:
+        made = boards(rows, target, resamples=200)
+    except InputError:
+        return []  # nothing ran there, or not over common seeds: the boards say so
+    found: list[Answer] = []
+    for board in sorted(made, key=lambda board: len(board.sensors)):
+        line = best_line(board)
+        if line is None:
+            continue
+        known = (one for one in found if set(one.sensors) <= set(board.sensors))
+        if any(one.method == line["label"] for one in known):
+            continue
+        shown = signal(target)
+        found.append(
+            Answer(
+                target=target,
+                plan=plan,
+                road=road,
+                sensors=board.sensors,
+                method=str(line["label"]),
+                guess=board.guess,
+                error=shown.display_factor * float(line["rms"]),
+                low=shown.display_factor * float(line["rms_from"]),
+                high=shown.display_factor * float(line["rms_to"]),
+                unit="" if shown.display_unit == "-" else shown.display_unit,
+                better=float(line["beats_guess"]),
+                skill=float(line["skill"]),
+                drives=int(line["cells"]),
+            )
+        )
+    return found

@@ -1,0 +1,71 @@
+"""Scenario names in, the plan that their board belongs to and the kind of road out.
+
+A board belongs to a plan: a suite, or what is left at one level of population. Rows outside a plan
+do not touch its boards.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+from gripbench.bench.catalogue.registry import find_scenario, load_suite, suite_files
+from gripbench.bench.running.recorded_scenarios import PREFIX
+from gripbench.errors import GripbenchError
+
+ROADS: tuple[tuple[str, float], ...] = (("ice", 0.2), ("snow", 0.4), ("wet", 0.7))
+"""Kind of road and the friction below which it is one; above all of them it is dry."""
+
+
+@cache
+def _plans() -> dict[str, str]:
+    """Return the suite of each scenario that a shipped suite names."""
+    found: dict[str, str] = {}
+    for name in suite_files():
+        for scenario in load_suite(name).names():
+            found.setdefault(scenario, name)
+    return found
+
+
+def plan_of(scenario: str) -> str:
+    """Return the plan of a scenario: its suite, `level N`, or empty for one of level 0.
+
+    Each recording of a real vehicle is a plan of its own: its runs are windows of one drive, which
+    have no counterpart in another scenario.
+    """
+    if scenario.startswith(PREFIX):
+        return scenario
+    level = scenario.partition("@")[2]
+    return _plans().get(scenario) or (f"level {level}" if level else "")
+
+
+@cache
+def road_of(scenario: str) -> str:
+    """Return the kind of road of a scenario: `dry`, `wet`, `snow`, `ice`, `changing`.
+
+    A real drive is a `real drive`; a scenario that is no longer at hand is on an `unknown` road.
+    """
+    if scenario.startswith(PREFIX):
+        return "real drive"
+    try:
+        found = sorted(_frictions(find_scenario(scenario)))
+    except GripbenchError:
+        return "unknown"
+    if not found:
+        return "unknown"
+    kinds = [_kind(value) for value in (found[0], found[-1])]
+    return kinds[0] if kinds[0] == kinds[1] else "changing"
+
+
+def _kind(friction: float) -> str:
+    return next((name for name, below in ROADS if friction < below), "dry")
+
+
+def _frictions(scenario: Any) -> list[float]:
+    """Return the friction coefficients that a scenario's file names."""
+    road = getattr(scenario, "road", None)
+    if road is not None:
+        values = (getattr(road, name, 0.0) for name in ("mu", "mu_right", "mu_after"))
+        return [value for value in values if value]
+    pieces = getattr(scenario, "friction", ())
+    return [value for piece in pieces for value in (piece.first, piece.last)]
