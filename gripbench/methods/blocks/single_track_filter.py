@@ -1,0 +1,101 @@
+"""Speed, steering, yaw rate and a_y in, lateral velocity out: what the single-track filters share.
+
+The speed comes from the fusion of production sensors or from a channel that measures it; readings
+that are missing are held as inputs and left out as measurements.
+"""
+
+from __future__ import annotations
+
+from math import atan2
+
+import numpy as np
+
+from gripbench.compilation import compiled
+from gripbench.methods.blocks.single_track import LOWEST_SPEED, SINGLE_TRACK_VEHICLE
+from gripbench.methods.blocks.speed_fusion import (
+    SPEED_PARAMETERS,
+    SPEED_SENSORS,
+    SPEED_STATE,
+    SPEED_VEHICLE,
+    advance_speed,
+)
+from gripbench.methods.settings import Parameter
+
+FUSED_SENSORS = (*SPEED_SENSORS, "accel_y")
+MEASURED_SENSORS = ("speed_x", "steer_angle", "yaw_rate", "accel_y")
+GPS_SENSORS = ("speed_gps", "steer_angle", "yaw_rate", "accel_y")
+"""Channels by the source of the speed."""
+
+FUSED_VEHICLE = tuple(dict.fromkeys((*SINGLE_TRACK_VEHICLE, *SPEED_VEHICLE)))
+"""Vehicle parameters of a single-track filter behind the speed fusion."""
+
+INPUT_STATE = np.dtype(
+    [
+        ("fusion", SPEED_STATE),
+        ("speed", np.float64),
+        ("steer", np.float64),
+        ("last_steer", np.float64),
+        ("speed_y", np.float64),  # that the fusion is told
+    ]
+)
+"""Inputs of a single-track filter: the last that were there."""
+
+NOISE_PARAMETERS = (
+    Parameter("speed_y_walk", 0.3, "m/s^2/sqrt(Hz)", "Noise density of d v_y/dt", 1e-4, 10.0),
+    Parameter("yaw_rate_walk", 0.1, "rad/s^2/sqrt(Hz)", "Noise density of d r/dt", 1e-4, 10.0),
+    Parameter("gyro_noise", 5e-4, "rad/s/sqrt(Hz)", "Noise density of the gyroscope", 1e-6, 1.0),
+    Parameter("accel_y_noise", 0.1, "m/s^2/sqrt(Hz)", "Noise density of a_y", 1e-4, 10.0),
+    Parameter("speed_y_std", 0.3, "m/s", "Standard deviation of v_y at the start", 1e-3, 10.0),
+)
+"""Noise levels of the single-track filters."""
+
+FUSED_PARAMETERS = (*NOISE_PARAMETERS, *SPEED_PARAMETERS)
+
+
+@compiled
+def read_fused(inputs, obs, params):  # type: ignore[no-untyped-def]
+    """Read the inputs of a sample; the speed is fused from production sensors."""
+    advance_speed(inputs.fusion, obs, params, inputs.speed_y)
+    _read(inputs, inputs.fusion.filter.x[0], obs)
+
+
+@compiled
+def read_measured(inputs, obs, params):  # type: ignore[no-untyped-def]
+    """Read the inputs of a sample; the speed is the channel `speed_x`."""
+    _read(inputs, obs.speed_x, obs)
+
+
+@compiled
+def read_gps(inputs, obs, params):  # type: ignore[no-untyped-def]
+    """Read the inputs of a sample; the speed is the channel `speed_gps`."""
+    _read(inputs, obs.speed_gps, obs)
+
+
+@compiled
+def _read(inputs, speed, obs):  # type: ignore[no-untyped-def]
+    if speed == speed:
+        inputs.speed = max(speed, LOWEST_SPEED)
+    elif inputs.speed < LOWEST_SPEED:
+        inputs.speed = LOWEST_SPEED
+    inputs.last_steer = inputs.steer
+    if obs.steer_angle == obs.steer_angle:
+        inputs.steer = obs.steer_angle
+    if obs.first:
+        inputs.last_steer = inputs.steer
+
+
+@compiled
+def write_lateral(inputs, speed_y, yaw_rate, variance, est):  # type: ignore[no-untyped-def]
+    """Write the estimates of a single-track filter; `variance` is that of v_y [m^2/s^2]."""
+    inputs.speed_y = speed_y
+    forward = inputs.speed
+    est.sideslip = atan2(speed_y, forward)
+    est.speed_y = speed_y
+    est.yaw_rate = yaw_rate
+    square = forward * forward + speed_y * speed_y
+    est.sideslip_variance = variance * (forward / square) ** 2
+    est.speed_y_variance = variance
+
+
+LATERAL_ESTIMATES = ("sideslip", "speed_y", "yaw_rate")
+LATERAL_VARIANCES = ("sideslip", "speed_y")
