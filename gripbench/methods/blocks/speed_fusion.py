@@ -8,7 +8,8 @@ and each wheel corrects it by the speed that it tells of the centre of gravity: 
 less the slip that its share of m a_x makes on the tyre on paper, moved from the wheel to the
 centre. What a wheel tells has an error that lasts (slip is no noise), so its variance is that of
 an error with correlation time `slip_time`. A wheel that spins or locks differs from the integrated
-speed by more than the gate and is weighted down by the square of the excess (Huber), so that the accelerometer carries the speed through braking, traction and slides.
+speed by more than the gate and is weighted down by the square of the excess, so that the
+accelerometer carries the speed through braking, traction and slides.
 
 References
 ----------
