@@ -16,7 +16,7 @@ from types import ModuleType
 from typing import Any, Literal
 
 from gripbench.envs.signals import SIGNALS, VARIANCE, signal
-from gripbench.errors import GripbenchError, InputError, nearest, unknown
+from gripbench.errors import LONGEST, GripbenchError, InputError, nearest, one_line, unknown
 from gripbench.methods.contract import CompiledMethod
 
 
@@ -151,12 +151,6 @@ _NAMES = ("sensors", "estimates", "variances", "vehicle_parameters")
 LONGEST_NAME = 100
 """Largest number of characters of a name, which is also that of a file."""
 
-LONGEST_TITLE = 200
-"""Largest number of characters of a title."""
-
-LONGEST_TEXT = 1000
-"""Largest number of characters that are kept of any text that a method makes."""
-
 _OF_WINDOWS = {
     "con", "prn", "aux", "nul", "conin$", "conout$",
     *(f"{port}{number}" for port in ("com", "lpt") for number in range(10)),
@@ -182,15 +176,11 @@ def declaration_from(given: Mapping[str, Any], kind: str = "method") -> Declarat
     if not isinstance(name, str) or not re.fullmatch(r"[a-z][a-z0-9_]*", name):
         raise InputError(
             f"{kind}: set the class attribute 'name' to a string of lower case letters, digits "
-            f"and underscores (it is {printable(repr(name))})"
+            f"and underscores (it is {one_line(repr(name), 120)})"
         )
     check_names("'name'", [name])
     title = given.get("title")
-    title = printable(name if title is None else str(title))
-    if len(title) > LONGEST_TITLE:
-        raise InputError(
-            f"{name}: 'title' has {len(title)} characters; at most {LONGEST_TITLE} are allowed"
-        )
+    title = one_line(name if title is None else str(title), LONGEST)
     sensors = _signals(given, name, "sensors", required=True)
     estimates = _signals(given, name, "estimates", required=True)
     variances = _signals(given, name, "variances")
@@ -206,7 +196,7 @@ def declaration_from(given: Mapping[str, Any], kind: str = "method") -> Declarat
     return Declaration(
         name=name,
         title=title,
-        reference=printable(str(given.get("reference") or "")),
+        reference=one_line(str(given.get("reference") or ""), 2 * LONGEST),
         sensors=sensors,
         estimates=estimates,
         variances=variances,
@@ -244,7 +234,7 @@ def check_names(what: str, names: Sequence[Any]) -> None:
     """
     for name in names:
         if not isinstance(name, str) or not name:
-            raise InputError(f"{what}: a name is {printable(repr(name))}; give a text")
+            raise InputError(f"{what}: a name is {one_line(repr(name), 120)}; give a text")
         wrong = (
             f"has {len(name)} characters; at most {LONGEST_NAME} are allowed"
             if len(name) > LONGEST_NAME
@@ -257,16 +247,9 @@ def check_names(what: str, names: Sequence[Any]) -> None:
             else ""
         )
         if wrong:
-            raise InputError(f"{what}: the name {printable(repr(name), 120)} {wrong}")
+            raise InputError(f"{what}: the name {one_line(repr(name), 120)} {wrong}")
         if list(names).count(name) > 1:
             raise InputError(f"{what} holds '{name}' twice")
-
-
-def printable(text: str, longest: int = LONGEST_TEXT) -> str:
-    """Return text that can be stored and printed: no lone surrogates, one line, not too long."""
-    text = text[: 4 * longest].encode("utf-8", "replace").decode("utf-8")
-    text = " ".join(re.sub(r"[\x00-\x1f\x7f-\x9f]", " ", text).split())
-    return text if len(text) <= longest else text[: longest - 3] + "..."
 
 
 def _signals(
@@ -278,7 +261,7 @@ def _signals(
             signal(item)
         except GripbenchError:
             raise InputError(
-                f"{name}: '{attribute}' names the unknown signal '{printable(item)}': "
+                f"{name}: '{attribute}' names the unknown signal '{one_line(item, 120)}': "
                 f"{nearest(item, SIGNALS)}"
             ) from None
     if "time" in value:
@@ -300,11 +283,11 @@ def _names(
         raise InputError(
             f"{name}: set the class attribute '{attribute}' to a tuple of {of} names, such as "
             f"('{'mass' if of == 'vehicle parameter' else 'accel_x'}',) "
-            f"(it is {printable(repr(value), 120)})"
+            f"(it is {one_line(repr(value), 120)})"
         )
     for item in value:
         if value.count(item) > 1:
-            raise InputError(f"{name}: '{attribute}' names '{printable(item)}' twice")
+            raise InputError(f"{name}: '{attribute}' names '{one_line(item, 120)}' twice")
     return tuple(value)
 
 
@@ -364,7 +347,7 @@ def describe_error(error: BaseException) -> str:
     while place is not None and place.tb_next is not None:
         place = place.tb_next
     try:
-        message = printable(str(error))
+        message = one_line(" ".join(str(error).split()), LONGEST)
     except Exception:  # its own code makes the text
         message = "its message cannot be read"
     text = f"{type(error).__name__}: {message}" if message else type(error).__name__

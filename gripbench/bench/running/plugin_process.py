@@ -25,6 +25,7 @@ import time
 from pathlib import Path
 from typing import Any, NoReturn
 
+import numba
 import numpy as np
 from numba.core.caching import NullCache
 from numba.core.dispatcher import Dispatcher
@@ -51,7 +52,9 @@ from gripbench.bench.running.messages import (
     message_bytes,
     read_message,
 )
+from gripbench.bench.running.trials import Trial, has_batch, perform
 from gripbench.envs.plants.simulation import Simulation
+from gripbench.envs.signals import record_type
 from gripbench.errors import GripbenchError
 from gripbench.methods import drivers
 from gripbench.methods.contract import CompiledMethod
@@ -173,6 +176,8 @@ class _Plugin:
     variant: str
     parameters: dict[str, Any]
     declaration: Declaration
+    batch: bool
+    expected: dict[str, str]
 
     def make(self) -> Any:
         return self.source.make(self.variant, self.parameters)
@@ -193,12 +198,19 @@ def _serve_plugin(line: _Line, forks: bool) -> NoReturn:
         line.send({"status": "failed", "reason": describe_error(error)})
     else:
         shared = forks and threading.active_count() == 1 and _threads() == 1
-        content = dataclasses.asdict(plugin.declaration)
-        seen = audit.report()
-        line.send({"status": "ok", "declaration": content, "shared": shared, "read": seen})
+        line.send(
+            {
+                "status": "ok",
+                "declaration": dataclasses.asdict(plugin.declaration),
+                "batch": plugin.batch,
+                "expected": plugin.expected,
+                "shared": shared,
+                "read": audit.report(),
+            }
+        )
         if shared:
             _fork_cells(line, plugin)
-        _serve_cell(line, plugin, line.message())
+        _serve_request(line, plugin, line.message())
     os._exit(0)
 
 
@@ -214,6 +226,8 @@ def _load(request: dict[str, Any]) -> _Plugin:
     _seed(request["seed"])
     if request["folder"]:
         os.chdir(request["folder"])
+    if request["bounds"]:
+        _check_bounds()
     sys.path.extend(place for place in request["path"] if place not in sys.path)
     payload = base64.b64decode(request["payload"])
     source = Source(request["kind"], request["target"], payload)
@@ -222,7 +236,17 @@ def _load(request: dict[str, Any]) -> _Plugin:
     declaration = declaration_of(method, variant, parameters)
     _forget_compiled(declaration)
     _compile(method)
-    return _Plugin(source, variant, parameters, declaration)
+    expected = {
+        str(check): str(reason)
+        for check, reason in dict(getattr(method, "expected_failures", {})).items()
+    }
+    return _Plugin(source, variant, parameters, declaration, has_batch(method), expected)
+
+
+def _check_bounds() -> None:
+    """Have numba compile with bounds checking, and nothing taken from its cache without."""
+    numba.config.BOUNDSCHECK = 1
+    Dispatcher.enable_caching = lambda self: None  # type: ignore[method-assign]
 
 
 def _forget_compiled(declaration: Declaration) -> None:
@@ -262,12 +286,38 @@ def _fork_cells(line: _Line, plugin: _Plugin) -> NoReturn:
         if process == 0:
             control.close()
             end_with(parent)
-            _serve_cell(_Line(*descriptors), plugin, request)
+            _serve_request(_Line(*descriptors), plugin, request)
         for descriptor in descriptors:
             os.close(descriptor)
         _, status = os.waitpid(process, 0)
         end_children()
         line.send({"ended": os.waitstatus_to_exitcode(status)})
+
+
+def _serve_request(line: _Line, plugin: _Plugin, request: dict[str, Any]) -> NoReturn:
+    if "trial" in request:
+        _serve_trial(line, plugin, request)
+    _serve_cell(line, plugin, request)
+
+
+def _serve_trial(line: _Line, plugin: _Plugin, request: dict[str, Any]) -> NoReturn:
+    """Try the method over samples that come all at once: not to be scored."""
+    try:
+        _seed(request["seed"])
+        declaration = plugin.declaration
+        kind = record_type((*declaration.sensors, "time"))
+        length = request["samples"]
+        content = line.receive(length * kind.itemsize) if length else b""
+        observations = np.frombuffer(content, kind).copy()
+        trial = Trial(plugin.make, declaration, request["vehicle"], observations, request["period"])
+        found = perform(request["trial"], trial)
+        lengths = [len(item) for item in found]
+        answer = message_bytes({"status": "ok", "lengths": lengths})
+        answer += b"".join(np.ascontiguousarray(item).tobytes() for item in found)
+    except BaseException as error:
+        answer = message_bytes(_failure(error))
+    line.put(answer)
+    os._exit(0)
 
 
 def _serve_cell(line: _Line, plugin: _Plugin, request: dict[str, Any]) -> NoReturn:

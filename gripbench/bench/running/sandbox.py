@@ -16,12 +16,12 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 import numpy.typing as npt
 
-from gripbench.bench.catalogue.declarations import Declaration, Source, declaration_from, printable
+from gripbench.bench.catalogue.declarations import Declaration, Source, declaration_from
 from gripbench.bench.running.execution import Outcome, runtime_of
 from gripbench.bench.running.lines import LateError, Line
 from gripbench.bench.running.messages import (
@@ -36,7 +36,7 @@ from gripbench.bench.running.messages import (
 from gripbench.bench.running.processes import PluginProcess, start_plugin, stop_starters
 from gripbench.envs.recordings import select_channels
 from gripbench.envs.signals import record_type
-from gripbench.errors import GripbenchError, InputError
+from gripbench.errors import LONGEST, GripbenchError, InputError, one_line
 
 LOADING = 60.0
 """Time [s] that loading and compiling a plug-in may take; no cell's limit counts it."""
@@ -93,6 +93,25 @@ class Settings:
     parameters: Mapping[str, Any]
 
 
+@dataclass(frozen=True)
+class Loaded:
+    """What a plug-in says of itself when it has been loaded.
+
+    Attributes
+    ----------
+    declaration
+        What it declares.
+    batch
+        Whether it has a form that takes a whole recording.
+    expected_failures
+        Checks that it is known to fail, each with the reason.
+    """
+
+    declaration: Declaration
+    batch: bool
+    expected_failures: dict[str, str]
+
+
 class Sandbox:
     """Processes of plug-ins, one after the other: the last one that was asked for is kept.
 
@@ -100,12 +119,15 @@ class Sandbox:
     ----------
     limits
         What a cell may take.
+    bounds
+        Whether numba compiles with bounds checking.
     """
 
-    def __init__(self, limits: Limits) -> None:
+    def __init__(self, limits: Limits, bounds: bool = False) -> None:
         self.limits = limits
+        self._bounds = bounds
         self._process: PluginProcess | None = None
-        self._loaded: tuple[Settings, Declaration] | None = None
+        self._loaded: tuple[Settings, Loaded] | None = None
         self._read: dict[str, Any] = {}
 
     def declare(self, source: Source, variant: str, parameters: dict[str, Any]) -> Declaration:
@@ -116,7 +138,7 @@ class Sandbox:
         CellFailure
             If it cannot be loaded.
         """
-        return self._load(Settings(source, variant, parameters))
+        return self.load(Settings(source, variant, parameters)).declaration
 
     def execute(
         self,
@@ -148,7 +170,7 @@ class Sandbox:
         CellFailure
             With status `failed`, `timeout` or `skipped` and the reason.
         """
-        found = self._load(Settings(source, variant, parameters))
+        found = self.load(Settings(source, variant, parameters)).declaration
         if (found.sensors, found.outputs) != (declaration.sensors, declaration.outputs):
             raise CellFailure("failed", "it declares other sensors or estimates than before")
         selected = select_channels(observations, found.sensors)
@@ -160,25 +182,95 @@ class Sandbox:
         if process is not None:
             process.end(grace=0.0)
 
-    def _load(self, settings: Settings) -> Declaration:
+    def load(self, settings: Settings) -> Loaded:
+        """Load a plug-in, unless it is the one that is there.
+
+        Raises
+        ------
+        CellFailure
+            If it cannot be loaded.
+        """
         if self._process is not None and self._loaded is not None and self._process.alive:
-            loaded, declaration = self._loaded
-            if loaded == settings:
-                return declaration
+            before, loaded = self._loaded
+            if before == settings:
+                return loaded
         self.close()
         self._process = process = start_plugin()
         line, limit = process.line, max(self.limits.time, LOADING)
         deadline = time.monotonic() + limit
-        answer = self._answer(line, deadline, limit, _loading(settings, self.limits))
+        answer = self._answer(line, deadline, limit, _loading(settings, self.limits, self._bounds))
         try:
-            declaration = declaration_from(answer["declaration"])
-        except (KeyError, TypeError, InputError) as error:
+            loaded = Loaded(
+                declaration_from(answer["declaration"]),
+                answer.get("batch") is True,
+                {str(name): str(text) for name, text in dict(answer["expected"]).items()},
+            )
+        except (KeyError, TypeError, ValueError, InputError) as error:
             self.close()
             raise CellFailure("failed", f"its declaration cannot be read: {error}") from None
         process.shared = process.forks and answer.get("shared") is True
-        self._loaded = (settings, declaration)
+        self._loaded = (settings, loaded)
         self._read = _read(answer)
-        return declaration
+        return loaded
+
+    def perform(
+        self,
+        settings: Settings,
+        form: str,
+        vehicle: Mapping[str, float],
+        observations: npt.NDArray[Any],
+        period: float,
+    ) -> list[npt.NDArray[Any]]:
+        """Return the estimates of a trial, for checks; see `trials.perform`.
+
+        Raises
+        ------
+        CellFailure
+            As `execute`.
+        """
+        declaration = self.load(settings).declaration
+        selected = select_channels(observations, declaration.sensors)
+        kind = record_type(declaration.outputs)
+        process, limit = self._process, self.limits.time
+        assert process is not None
+        deadline = time.monotonic() + limit
+        content = {
+            "trial": form,
+            "vehicle": dict(vehicle),
+            "period": period,
+            "samples": len(selected),
+            "seed": _generator_seed(declaration, selected),
+        }
+        line = process.open_cell(content)
+        try:
+            line.put(selected.tobytes(), deadline)
+            answer = self._answer(line, deadline, limit)
+            lengths = answer.get("lengths")
+            if not isinstance(lengths, list) or len(lengths) > 2:
+                raise ValueError("no trial")
+            found = []
+            for length in lengths:
+                if not isinstance(length, int) or not 0 < length <= len(selected):
+                    raise ValueError(f"estimates of {length} samples")
+                content_of = line.receive(length * kind.itemsize, deadline)
+                found.append(np.frombuffer(content_of, kind).copy())
+            return found
+        except (LateError, EOFError, OSError) as error:
+            self._lost(error, limit)
+            raise
+        except ValueError as error:
+            self.close()
+            raise CellFailure("failed", f"its answer cannot be read: {error}") from None
+        finally:
+            self._end_cell(process, line)
+
+    def _end_cell(self, process: PluginProcess, line: Line) -> None:
+        if process.shared:
+            line.close()
+            if process.alive and not process.finish_cell(ENDING):
+                self.close()
+        else:
+            self.close()
 
     def _run(
         self,
@@ -203,12 +295,7 @@ class Sandbox:
             replies = self._stream(line, hello.get("process"), declaration, observations, deadline)
             self._finish(line)
         finally:
-            if process.shared:
-                line.close()
-                if process.alive and not process.finish_cell(ENDING):
-                    self.close()
-            else:
-                self.close()
+            self._end_cell(process, line)
         estimates = np.empty(len(observations), record_type(declaration.outputs))
         values = estimates.view(np.float64).reshape(len(observations), -1)
         values[:] = replies["estimates"]
@@ -249,7 +336,7 @@ class Sandbox:
             raise CellFailure("failed", f"its answer cannot be read: {error}") from None
         return np.frombuffer(bytes(replies), kind)
 
-    def _fail(self, line: Line, reply: bytes, expected: bytes, deadline: float) -> None:
+    def _fail(self, line: Line, reply: bytes, expected: bytes, deadline: float) -> NoReturn:
         """Raise what a reply says that does not hold the estimates that were asked for."""
         nonce, index, process, kind = HEADER.unpack(reply[: HEADER.size])
         asked = HEADER.unpack(expected)
@@ -293,18 +380,18 @@ class Sandbox:
             self._refuse(answer)
         return answer
 
-    def _refuse(self, answer: Mapping[str, Any]) -> None:
+    def _refuse(self, answer: Mapping[str, Any]) -> NoReturn:
         """Raise what went wrong inside the process."""
         status = answer.get("status")
         if status == "out of memory":
             self.close()  # what it holds may never be given back
             limit = self.limits.memory / 1024**2
             raise CellFailure("failed", f"out of memory (limit {limit:.0f} MiB)", memory=limit)
-        reason = printable(str(answer.get("reason", "")))
+        reason = one_line(str(answer.get("reason", "")), LONGEST)
         read = _read(answer) or self._read
         raise CellFailure("skipped" if status == "skipped" else "failed", reason, read=read)
 
-    def _lost(self, error: Exception, limit: float) -> None:
+    def _lost(self, error: Exception, limit: float) -> NoReturn:
         """Raise why a process does not answer any more."""
         process, self._process, self._loaded = self._process, None, None
         assert process is not None
@@ -321,7 +408,7 @@ class Sandbox:
         raise CellFailure("failed", _last_words(code), read=self._read, outside=outside)
 
 
-def _loading(settings: Settings, limits: Limits) -> dict[str, Any]:
+def _loading(settings: Settings, limits: Limits, bounds: bool) -> dict[str, Any]:
     """Return the message that has a plug-in loaded."""
     source = settings.source
     folder = ""
@@ -337,6 +424,7 @@ def _loading(settings: Settings, limits: Limits) -> dict[str, Any]:
         "folder": folder,
         "path": _places(source.kind, folder),
         "seed": _digest(b"loading"),
+        "bounds": bounds,
     }
 
 
