@@ -230,7 +230,7 @@ def choose_method(
         source = _source_of_value(method)
     if variant == "corrected" and not source.payload:
         variant = ""  # the default of every built-in: one name for one thing
-    isolated = not (source.kind == "module" and source.target.startswith("gripbench.methods."))
+    isolated = is_isolated(source)
     if isolated and source.kind != "value":
         from gripbench.bench.running.sandbox import (
             declare,  # a plug-in's code runs in its sandbox only
@@ -252,6 +252,11 @@ def choose_method(
         isolated=isolated,
         digest=method_digest(source, declaration),
     )
+
+
+def is_isolated(source: Source) -> bool:
+    """Return whether a method's code runs in a process of its own: it does not ship with us."""
+    return not (source.kind == "module" and source.target.startswith("gripbench.methods."))
 
 
 def method_digest(source: Source, declaration: Declaration) -> str:

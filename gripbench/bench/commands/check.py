@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from gripbench.bench.running.store import DEFAULT_RESULTS
+
 
 def register(app: typer.Typer) -> None:
     """Add the commands."""
@@ -29,21 +31,40 @@ def check(
     only: Annotated[
         list[str] | None, typer.Option("--check", help="Only this check; repeat for more.")
     ] = None,
+    time_limit: Annotated[
+        float, typer.Option(help="Seconds that one run of it over one recording may take.")
+    ] = 60.0,
+    memory_limit: Annotated[float, typer.Option(help="MiB that it may take.")] = 2048.0,
+    results: Annotated[
+        Path, typer.Option(help="Folder of the stored rows, beside which the result is kept.")
+    ] = DEFAULT_RESULTS,
 ) -> None:
     """Check a method against everything that the benchmark expects of one."""
-    from rich.table import Table
-
-    from gripbench.bench.catalogue.check import check_estimator, failures
+    from gripbench.bench.catalogue.check import check_estimator, failures, tally
     from gripbench.bench.publishing.presentation import console
+    from gripbench.bench.running.api import limits_of
+    from gripbench.bench.running.check_records import keep_record
 
-    results = check_estimator(method, scenario or (), checks=only or ())
-    table = Table("check", "result")
-    for name, text in results.items():
-        table.add_row(name, text)
-    console().print(table)
-    failed = failures(results)
-    console().print(f"{len(results) - len(failed)} of {len(results)} checks without failure")
-    if failed:
+    out = console()
+    with out.status("") as status:
+
+        def on_result(name: str, text: str | None) -> None:
+            if text is None:
+                status.update(name)
+            else:
+                out.print(f"{name:26}{text}", markup=False, highlight=False, soft_wrap=True)
+
+        found = check_estimator(
+            method,
+            scenario or (),
+            checks=only or (),
+            limits=limits_of(time_limit, memory_limit),
+            on_result=on_result,
+        )
+    out.print(tally(found), markup=False, highlight=False)
+    if not (scenario or only):
+        keep_record(results, method, found)
+    if failures(found):
         raise typer.Exit(1)
 
 
