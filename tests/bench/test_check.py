@@ -199,7 +199,8 @@ FAULTS = [
 
 
 def test_every_check_has_a_method_that_fails_it():
-    assert {check for _, check, _ in FAULTS} == set(CHECKS)
+    # tests/plugins has the one whose step is compiled again with bounds checking
+    assert {check for _, check, _ in FAULTS} == set(CHECKS) - {"reads_within_bounds"}
 
 
 @pytest.mark.parametrize(("method", "check", "message"), FAULTS)
@@ -213,7 +214,8 @@ def test_a_mistake_is_found_and_named(method, check, message):
 def test_a_sound_plain_class_passes():
     results = check_estimator(Sound, SCENARIO)
     assert failures(results) == {}
-    assert [name for name, text in results.items() if text != PASSED] == ["online_and_batch_agree"]
+    left = ["reads_within_bounds", "online_and_batch_agree"]
+    assert [name for name, text in results.items() if text != PASSED] == left
 
 
 @pytest.mark.parametrize("name", built_in_methods())

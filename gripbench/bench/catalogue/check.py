@@ -206,7 +206,9 @@ def _verdict(name: str, subject: Subject, expected: str | None, before: dict[str
     except (ExpectationError, EstimateError) as error:
         cause, found = str(error), f"{error}; {remedy}"
     except CellFailure as error:
-        cause, found = str(error), f"{error}; {remedy}"
+        cause = found = str(error)
+        if not cause.startswith(("its process", "stopped after", "out of memory")):
+            found = f"{error}; {remedy}"
     except Exception as error:
         cause = describe_error(error)
         found = f"it raised {cause}; {remedy}"

@@ -50,10 +50,12 @@ class Subject:
 
     @property
     def vehicle(self) -> dict[str, float]:
+        """Vehicle parameters of the recording that most checks run on."""
         return self.recordings[0].vehicle
 
     @property
     def observations(self) -> npt.NDArray[Any]:
+        """What the method is given of that recording, shape (n,)."""
         return select_channels(self.recordings[0].observations[:SAMPLES], self.declaration.sensors)
 
     def estimates(
@@ -192,7 +194,7 @@ def _picklable(subject: Subject) -> None:
 
 def _step_within_sample_time(subject: Subject) -> None:
     (found,) = subject.trial("timed", subject.observations[:ONLINE_SAMPLES])
-    median = float(found[found.dtype.names[0]][0])
+    median = float(found[subject.declaration.outputs[0]][0])
     if median > subject.period:
         raise ExpectationError(
             f"half of its steps take more than {median * 1e3:.2f} ms, "

@@ -52,7 +52,7 @@ def check(
             if text is None:
                 status.update(name)
             else:
-                out.print(f"{name:26}{text}", markup=False, highlight=False, soft_wrap=True)
+                out.print(f"{name:27}{text}", markup=False, highlight=False, soft_wrap=True)
 
         found = check_estimator(
             method,

@@ -252,6 +252,7 @@ def _row(cell: Cell, targets: tuple[str, ...], status: Status, reason: str) -> R
         status=status,
         reason=reason,
         sample_period=cell.scenario.sample_time,
+        method_digest=cell.method.digest if cell.method.isolated else "",
         versions=versions(),
     )
 

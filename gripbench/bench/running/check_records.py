@@ -11,18 +11,15 @@ import inspect
 import json
 from functools import cache
 from pathlib import Path
-from typing import Literal
 from urllib.parse import quote
 
 from pydantic import Field
 
+from gripbench.bench.running.rows import Checked
 from gripbench.configuration import Configuration, parse
 from gripbench.errors import InputError
 from gripbench.sources import digest
 from gripbench.writing import write_atomically
-
-Checked = Literal["", "passed", "failed", "old", "missing"]
-"""A row's mark; empty: it needs none."""
 
 
 class CheckRecord(Configuration):

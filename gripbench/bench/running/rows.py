@@ -32,6 +32,9 @@ def _storable(text: Any) -> Any:
     return one_line(text, LONGEST) if isinstance(text, str) else text
 
 
+Checked = Literal["", "passed", "failed", "old", "missing"]
+"""What the checks of a plug-in have said; empty: it needs none."""
+
 Status = Literal["ok", "failed", "timeout", "diverged", "skipped"]
 
 
@@ -93,6 +96,12 @@ class Row(Configuration):
         kind and name; where one differs the cell runs again.
     untracked
         What it did whose result no digest can follow: the row is never used again.
+    method_digest
+        Digest of source and settings of a plug-in; empty for a method that ships with gripbench.
+    checked
+        Mark of a plug-in's row, found when it is read, not stored in it: `passed`, `failed`, `old`
+        or `missing`, as `gripbench check` left it (see `check_records`); empty: it needs none.
+        Boards show every other mark than `passed`; the published one leaves such methods out.
     """
 
     schema_version: int = SCHEMA_VERSION
@@ -121,6 +130,8 @@ class Row(Configuration):
     world: str = ""
     dependencies: dict[str, str] = Field(default_factory=dict)
     untracked: tuple[str, ...] = ()
+    method_digest: str = ""
+    checked: Checked = Field(default="", exclude=True)
     versions: dict[str, str] = Field(default_factory=dict)
 
 
@@ -227,7 +238,7 @@ def frame_of(rows: Iterable[Row]) -> pd.DataFrame:
     vanishes from a table made of the frame. Columns: `scenario, seed, label, method, variant,
     title, target, status, reason`, the columns of each metric, `sample_period, step_batch,
     step_p50, step_p99, step_max, deadline_misses, sensors, idealised, parameters, baseline,
-    world, key`.
+    world, key, checked`.
 
     A metric has a column of its name; one that is pooled by totals also `<name>_total` and
     `<name>_count`, which for the RMS are called `sum_of_squares` and `count`. NaN: the metric has
@@ -256,7 +267,7 @@ def frame_of(rows: Iterable[Row]) -> pd.DataFrame:
 _COMMON = (
     "scenario", "seed", "label", "method", "variant", "title", "status", "reason",
     "sample_period", "step_batch", "step_p50", "step_p99", "step_max", "deadline_misses",
-    "sensors", "idealised", "parameters", "baseline", "world", "key",
+    "sensors", "idealised", "parameters", "baseline", "world", "key", "checked",
 )  # fmt: skip
 
 
@@ -283,6 +294,7 @@ def _common_columns(row: Row) -> dict[str, Any]:
         "baseline": row.baseline,
         "world": row.world,
         "key": row.key,
+        "checked": row.checked,
     }
 
 

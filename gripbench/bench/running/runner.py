@@ -141,7 +141,7 @@ def run_plan(
             continue
         report.stored += 1
         report.statuses[row.status] += 1
-        on_row(row)
+        on_row(store.marked(row))
     lost = 0
     try:
         while waiting:
@@ -153,7 +153,7 @@ def run_plan(
                         done.add((row.scenario, row.label, row.seed))
                         report.computed += 1
                         report.statuses[row.status] += 1
-                        on_row(row)
+                        on_row(store.marked(row))
                 break
             except WorkerLostError:
                 lost += 1

@@ -17,7 +17,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import quote
 
-from gripbench.bench.running.rows import Row, frame_of, is_newer, row_from
+from gripbench.bench.running.check_records import mark_of
+from gripbench.bench.running.rows import Checked, Row, frame_of, is_newer, row_from
 from gripbench.errors import InputError, one_line
 from gripbench.sources import digest
 from gripbench.writing import write_atomically
@@ -78,6 +79,7 @@ class Store:
     def __init__(self, results: Path | str = DEFAULT_RESULTS) -> None:
         self.results = Path(results)
         self.rows = self.results / "rows"
+        self._marks: dict[tuple[str, str], Checked] = {}
 
     def path(self, scenario: str, label: str, seed: int) -> Path:
         """Return the file of a cell."""
@@ -113,6 +115,15 @@ class Store:
         if row is not None and (row.scenario, row.label, row.seed) != (scenario, label, seed):
             raise _damaged(path, "of another cell")
         return row
+
+    def marked(self, row: Row) -> Row:
+        """Return a row with what is known of its method's checks; see `Row.checked`."""
+        if not row.method_digest:
+            return row
+        what = (row.label, row.method_digest)
+        if what not in self._marks:
+            self._marks[what] = mark_of(self.results, *what)
+        return row.model_copy(update={"checked": self._marks[what]})
 
     def remove(self, scenario: str, label: str, seed: int) -> None:
         """Remove the row of a cell, where there is one."""
@@ -168,10 +179,10 @@ class Store:
             if row is None:
                 continue
             if path == self.path(row.scenario, row.label, row.seed):
-                yield row
+                yield self.marked(row)
             elif path in self._earlier(row.scenario, row.label, row.seed):
                 if not self.path(row.scenario, row.label, row.seed).exists():
-                    yield row
+                    yield self.marked(row)
             else:
                 left_out.append(path)
         if left_out:

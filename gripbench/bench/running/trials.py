@@ -127,7 +127,8 @@ def _timed(trial: Trial) -> list[Records]:
         trial.period,
         timed=True,
     ).runtime
-    return [_records([[runtime.p50 or 0.0]], trial.declaration.outputs[:1])]
+    outputs = trial.declaration.outputs
+    return [_records([[runtime.p50 or 0.0] * len(outputs)], outputs)]
 
 
 FORMS: dict[str, Callable[[Trial], list[Records]]] = {
@@ -141,4 +142,4 @@ FORMS: dict[str, Callable[[Trial], list[Records]]] = {
 }
 """Ways to try a method: a run in its fastest form; in two new ones; online; online twice with
 `reset` between; with one dict for all samples (as given, as found later); as it is and unpickled;
-timed (one record whose first field is the median time of a step [s])."""
+timed (one record whose fields are the median time of a step [s])."""
