@@ -217,7 +217,7 @@ def _files(given: Mapping[str, Any], name: str) -> tuple[str, ...]:
     ):
         raise InputError(
             f"{name}: set 'files' to a tuple of file names, such as ('net.npz',) "
-            f"(it is {printable(repr(files))})"
+            f"(it is {one_line(repr(files), 120)})"
         )
     return tuple(files)
 

@@ -1,4 +1,4 @@
-"""A compiled step that reads behind the end of an array: a plausible figure without bounds checks."""
+"""A compiled step that reads behind the end of an array: a plausible figure, unless checked."""
 
 import numpy as np
 
