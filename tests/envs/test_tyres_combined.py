@@ -8,10 +8,12 @@ from hypothesis import strategies as st
 from gripbench.envs.tyres.combined import (
     BRUSH,
     DUGOFF,
+    FITTED_CURVE,
     MAGIC_FORMULA,
     SHAPES,
     combined_force,
     secant,
+    tangent,
 )
 from gripbench.envs.tyres.magic_formula import MAGIC_SHAPE
 
@@ -91,3 +93,22 @@ def test_magic_formula_peaks_at_the_capacity_and_falls_behind_it():
     assert force.max() == pytest.approx(1.0, abs=1e-6)
     assert peak == pytest.approx(MAGIC_SHAPE * math.tan(math.pi / (2.0 * MAGIC_SHAPE)), rel=1e-2)
     assert force[-1] < 0.92
+
+
+@given(shapes, st.floats(1e-3, 60.0))
+def test_tangent_is_the_slope_of_the_force(shape, s):
+    step = 1e-6 * max(s, 1.0)
+    ahead, behind = (secant(shape, at) * at for at in (s + step, s - step))
+    assert tangent(shape, s) == pytest.approx((ahead - behind) / (2.0 * step), abs=2e-6)
+
+
+def test_the_fitted_curve_peaks_at_one_where_burckhardt_does():
+    s = np.linspace(0.0, 40.0, 40_001)[1:]
+    force = np.array([secant(FITTED_CURVE, value) * value for value in s])
+    assert force.max() == pytest.approx(1.0, abs=1e-6)
+    # c1 c2 exp(-c2 lambda) = c3, and lambda is s times peak over initial slope
+    slip = math.log(1.2801 * 23.99 / 0.52) / 23.99
+    peak = 1.2801 * (1.0 - math.exp(-23.99 * slip)) - 0.52 * slip
+    expected = slip * (1.2801 * 23.99 - 0.52) / peak
+    assert s[force.argmax()] == pytest.approx(expected, abs=2e-3)
+    assert force[-1] == pytest.approx((1.2801 * (1.0 - math.exp(-23.99)) - 0.52) / peak)
