@@ -1,8 +1,8 @@
 """gripbench: a benchmark of estimators of tyre-road friction and vehicle sideslip.
 
 The names below are the stable Python interface; everything else may move between versions. They
-are imported when first used, so that `import gripbench` costs little; it registers the scenarios
-as Gymnasium environments.
+are imported when first used, so that `import gripbench` costs little. The scenarios are registered
+as environments as soon as Gymnasium is imported, before or after.
 
 Examples
 --------
@@ -21,7 +21,7 @@ import os
 import sys
 from typing import TYPE_CHECKING, Any
 
-from gripbench.envs.gym.registration import register_environments
+from gripbench.envs.gym.registration import register_with_gymnasium
 
 if TYPE_CHECKING:
     from gripbench.bench.catalogue.check import check_estimator
@@ -39,11 +39,11 @@ if TYPE_CHECKING:
         compiled,
     )
 
-# numba's cache must see edits of what a function calls, see gripbench.compilation
+# numba's cache must see edits of what a function calls, see gripbench.compiled_cache
 _LOCATORS = (
-    "gripbench.compilation.InGivenFolder,gripbench.compilation.BesideSource,"
-    "gripbench.compilation.InUserFolder,"
-    "gripbench.compilation.InTemporaryFolder,"
+    "gripbench.compiled_cache.InGivenFolder,gripbench.compiled_cache.BesideSource,"
+    "gripbench.compiled_cache.InUserFolder,"
+    "gripbench.compiled_cache.InTemporaryFolder,"
     "UserProvidedCacheLocator,InTreeCacheLocator,UserWideCacheLocator,IPythonCacheLocator"
 )
 os.environ.setdefault("NUMBA_CACHE_LOCATOR_CLASSES", _LOCATORS)
@@ -96,4 +96,4 @@ def __dir__() -> list[str]:
     return sorted([*globals(), *DEFINED_IN])
 
 
-register_environments()
+register_with_gymnasium()

@@ -1,118 +1,36 @@
-"""How functions are compiled: the two sets of options, and a cache that sees every edit.
+"""A function over numbers and records in, its compiled form out; numba loads with the first one.
 
-numba compares the file of a function only, so a step would keep running the old form of a
-building block that was edited in another module. The locator below answers with the digest of
-the file and of all that it imports from the project.
+A process that only lists what there is compiles nothing: `declare_only` leaves the functions as
+they are and numba out, which is most of what such a command would take.
 """
 
 from __future__ import annotations
 
-import os
-import stat
-import tempfile
 from collections.abc import Callable
-from functools import cache
-from pathlib import Path
 from typing import Any
 
-import numba
-from numba.core.caching import (
-    InTreeCacheLocator,
-    UserProvidedCacheLocator,
-    UserWideCacheLocator,
-)
-
-from gripbench.errors import InputError
-from gripbench.sources import imports_gripbench, in_project, source_digest
+_declare_only = False
 
 
-def _stamp(path: str) -> str:
-    return _stamp_of_project(path) if in_project(Path(path)) else source_digest(Path(path))
+def declare_only() -> None:
+    """Leave functions uncompiled in this process, which must run none of them."""
+    global _declare_only
+    _declare_only = True
 
 
 def compiled(function: Callable[..., Any]) -> Any:
     """Compile a function over records; division by zero gives inf or NaN as in NumPy."""
-    return numba.njit(cache=True, error_model="numpy", nogil=True)(function)
+    return _njit(function, cache=True, nogil=True)
 
 
 def inlined(function: Callable[..., Any]) -> Any:
     """Compile a short function into each of its callers."""
-    return numba.njit(inline="always", error_model="numpy")(function)
+    return _njit(function, inline="always")
 
 
-@cache
-def _stamp_of_project(path: str) -> str:
-    return source_digest(Path(path))
+def _njit(function: Callable[..., Any], **options: Any) -> Any:
+    if _declare_only:
+        return function
+    import numba  # .4 s
 
-
-def _concerned(path: str) -> bool:
-    return Path(path).is_file() and imports_gripbench(Path(path))
-
-
-class _Stamped:
-    """Mixed into numba's locators: only for files of this project or that use it."""
-
-    _py_file: str
-
-    def get_source_stamp(self) -> str:
-        """Return the digest of the file with everything that it rests on."""
-        return _stamp(self._py_file)
-
-    @classmethod
-    def from_function(cls, py_func: Any, py_file: str) -> Any:
-        """Return a locator, or None to leave the function to numba's own."""
-        if not _concerned(py_file):
-            return None
-        return super().from_function(py_func, py_file)  # type: ignore[misc]
-
-
-class InGivenFolder(_Stamped, UserProvidedCacheLocator):
-    """Cache in the folder of `NUMBA_CACHE_DIR`, where that is set."""
-
-
-class InTemporaryFolder(_Stamped, UserWideCacheLocator):
-    """Cache in a folder of this user among the temporary files, where neither can be written."""
-
-    def __init__(self, py_func: Any, py_file: str) -> None:
-        self._py_file = py_file
-        self._lineno = py_func.__code__.co_firstlineno
-        self._folder = Path(tempfile.gettempdir(), f"gripbench_numba_{_user()}")
-        self._cache_path = str(self._folder / self.get_suitable_cache_subpath(py_file))
-
-    def ensure_cache_path(self) -> None:
-        """Make the folder; what lies there is executed, so nobody else may have made it."""
-        self._folder.mkdir(mode=0o700, exist_ok=True)
-        about = self._folder.lstat()
-        owner = getattr(os, "getuid", lambda: about.st_uid)()
-        if not stat.S_ISDIR(about.st_mode) or about.st_uid != owner or about.st_mode & 0o022:
-            raise OSError(f"{self._folder} is not this user's own")
-        super().ensure_cache_path()
-
-    @classmethod
-    def from_function(cls, py_func: Any, py_file: str) -> Any:
-        """Return a locator; it is the last one.
-
-        Raises
-        ------
-        InputError
-            If compiled code cannot be kept anywhere.
-        """
-        found = super().from_function(py_func, py_file)
-        if found is None and _concerned(py_file):
-            raise InputError(
-                "compiled code can be kept neither beside the package, nor in the home folder, nor "
-                f"in {tempfile.gettempdir()}: set NUMBA_CACHE_DIR to a folder that can be written"
-            )
-        return found
-
-
-def _user() -> str:
-    return str(os.getuid()) if hasattr(os, "getuid") else "user"
-
-
-class BesideSource(_Stamped, InTreeCacheLocator):
-    """Cache beside the source, where that can be written."""
-
-
-class InUserFolder(_Stamped, UserWideCacheLocator):
-    """Cache in the user's folder otherwise."""
+    return numba.njit(error_model="numpy", **options)(function)

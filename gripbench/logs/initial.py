@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numba
 import numpy as np
 
+from gripbench.compilation import compiled
 from gripbench.errors import InputError
 from gripbench.logs.series import Floats, Series
 
@@ -92,7 +92,7 @@ def _first_level(series: Series, widest: float, shortest: float) -> tuple[float,
     return (float(series.times[start]), float(series.times[end])) if start >= 0 else None
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def _level_rows(times, values, widest, shortest, middle):  # type: ignore[no-untyped-def]
     start = 0
     low = high = values[0]

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
+from gripbench.compilation import compiled
 from gripbench.envs.signals import signal
 from gripbench.envs.vehicles import VEHICLE_PARAMETERS
 from gripbench.errors import InputError
@@ -178,7 +178,7 @@ def _new_samples(
     return np.ones(len(times), dtype=bool)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def _changed_or_due(times, values, longest):  # type: ignore[no-untyped-def]
     new = np.ones(len(times), dtype=np.bool_)
     since = times[0]

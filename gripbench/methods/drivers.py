@@ -12,10 +12,8 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-import numba
 import numpy as np
 import numpy.typing as npt
-from numba.core.errors import NumbaError
 
 from gripbench.envs.signals import NEW, select_channels
 from gripbench.errors import GripbenchError, UndeclaredChannelError
@@ -62,9 +60,12 @@ def online(method: CompiledMethod, records: Records, obs: Mapping[str, float]) -
 
 def compile_single(method: CompiledMethod) -> None:
     """Compile what `online` calls, without a call of the step."""
+    import numba
+
     types = method.record_types
     names = ("state", "obs", "params", "est")
-    signature = tuple(numba.typeof(np.zeros(1, getattr(types, name))) for name in names)
+    records = Records(*(np.zeros(1, getattr(types, name)) for name in names))
+    signature = tuple(map(numba.typeof, _arrays(records, records.obs)))
     _single(method.step).compile(signature)  # type: ignore[attr-defined]
 
 
@@ -107,6 +108,8 @@ def _reading(method: CompiledMethod, obs: Mapping[str, float], name: str) -> flo
 @cache
 def _single(step: Callable[..., Any]) -> Callable[..., Any]:
     # Arrays of length 1 pass numba's dispatcher four times faster than single records do.
+    import numba
+
     @numba.njit(nogil=True, error_model="numpy")
     def single(state, obs, params, est, values, memory, layout):  # type: ignore[no-untyped-def]
         if admit(values[0], memory, layout):
@@ -117,6 +120,8 @@ def _single(step: Callable[..., Any]) -> Callable[..., Any]:
 
 @cache
 def _loop(step: Callable[..., Any]) -> Callable[..., Any]:
+    import numba
+
     @numba.njit(nogil=True, error_model="numpy")
     def loop(state, obs, params, est, values, memory, layout, whole):  # type: ignore[no-untyped-def]
         for k in range(obs.shape[0]):
@@ -133,7 +138,9 @@ def _call(method: CompiledMethod, function: Callable[..., Any], *records: npt.ND
         function(*records)
     except KeyError as error:  # numba, typing a record that has no such field
         raise _undeclared(method, str(error.args[0])) from None
-    except NumbaError as error:
+    except Exception as error:
+        if type(error).__module__ != "numba.core.errors":
+            raise
         found = re.search(r"Field '(\w+)' was not found in record", str(error))
         if found:
             raise _undeclared(method, found.group(1)) from None

@@ -16,10 +16,10 @@ Where a step is not called its estimates hold.
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
+from gripbench.compilation import compiled
 from gripbench.envs.signals import NEW, signal
 
 LATE = 1.0
@@ -66,7 +66,7 @@ def regular(values: npt.NDArray[np.float64]) -> bool:
     return bool(np.isfinite(values).all() and (values[1:, -2] > 0.0).all())
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def admit(row, memory, layout):  # type: ignore[no-untyped-def]
     """Complete a sample in place and return whether a step may take it.
 

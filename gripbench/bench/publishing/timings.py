@@ -12,12 +12,12 @@ import math
 from pathlib import Path
 from typing import Any
 
-import numba
 import numpy as np
 import numpy.typing as npt
 from pydantic import Field, ValidationError
 from scipy import stats
 
+from gripbench.compilation import compiled
 from gripbench.configuration import Configuration
 from gripbench.errors import InputError
 
@@ -53,7 +53,7 @@ class RelativeRuntime(Configuration):
     step: float = Field(gt=0.0)
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def reference_kernel(steps: int) -> float:
     """Run a pendulum with friction by Euler's method: the arithmetic of a small filter step.
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
+from gripbench.compilation import compiled
 from gripbench.envs.recordings import Recording
 from gripbench.envs.vehicles import GRAVITY
 
@@ -92,7 +92,7 @@ def _smooth(time: Floats, values: Floats) -> Floats:
     return np.asarray(_leaky_integral(time, values, _SMOOTHING)) / _SMOOTHING
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled
 def _leaky_integral(time, rate, forgetting):  # type: ignore[no-untyped-def]
     out = np.zeros(len(time))
     for k in range(1, len(time)):

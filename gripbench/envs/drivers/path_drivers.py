@@ -12,11 +12,11 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal
 
-import numba
 import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
+from gripbench.compilation import compiled
 from gripbench.configuration import Configuration
 from gripbench.envs.plants.planar import plant
 from gripbench.envs.roads.road import SPACING
@@ -160,13 +160,13 @@ DRIVER = np.dtype(
 INDEX, ARMS, OFFSET, ASTRAY, BEYOND, MEMORY = 0, 1, 2, 3, 4, 5
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def wrapped(angle):  # type: ignore[no-untyped-def]
     """Return an angle within -pi to pi."""
     return angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def find_on_path(x, path, memory):  # type: ignore[no-untyped-def]
     """Move the driver's place on the path forward to the point beside the vehicle."""
     last = path.shape[0] - 2
@@ -187,7 +187,7 @@ def find_on_path(x, path, memory):  # type: ignore[no-untyped-def]
     memory[ASTRAY] = wrapped(x[plant.YAW] - path[i, 2])
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def steer_along(x, u, p, driver, path, memory):  # type: ignore[no-untyped-def]
     """Return the steering angle that the path driver wants [rad]."""
     v_x = max(x[plant.V_X], 1.0)
@@ -217,7 +217,7 @@ def steer_along(x, u, p, driver, path, memory):  # type: ignore[no-untyped-def]
     return moving + slip + driver.yaw_damping * (curvature * speed - x[plant.YAW_RATE])
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def command(time, x, u, p, driver, planned, path, memory, action):  # type: ignore[no-untyped-def]
     """Write the driver's next action: the steering angle to reach and four wheel torques.
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from math import pi, sin
 from typing import Self
 
-import numba
 import numpy as np
 import numpy.typing as npt
 from pydantic import Field, model_validator
 
+from gripbench.compilation import compiled, inlined
 from gripbench.configuration import Configuration
 
 SEGMENT_TYPE = np.dtype(
@@ -62,7 +62,7 @@ def breakpoints(segments: tuple[Segment, ...]) -> set[float]:
     return {time for s in segments for time in (s.start, s.end)}
 
 
-@numba.njit(inline="always", error_model="numpy")
+@inlined
 def _piece_value(time, piece):  # type: ignore[no-untyped-def]
     share = (time - piece.start) / (piece.end - piece.start)
     value = piece.first + (piece.last - piece.first) * share
@@ -71,7 +71,7 @@ def _piece_value(time, piece):  # type: ignore[no-untyped-def]
     return value
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def profile_value(time, segments):  # type: ignore[no-untyped-def]
     """Return the value of a profile; at a jump, the value after it."""
     value = 0.0
@@ -82,7 +82,7 @@ def profile_value(time, segments):  # type: ignore[no-untyped-def]
     return value
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def profile_values(times, segments):  # type: ignore[no-untyped-def]
     """Return the values of a profile at ascending times, the bytes of `profile_value`."""
     values = np.zeros(times.shape[0])

@@ -13,11 +13,11 @@ import zlib
 from collections.abc import Mapping
 from typing import Any, Self
 
-import numba
 import numpy as np
 import numpy.typing as npt
 from pydantic import Field, model_validator
 
+from gripbench.compilation import compiled
 from gripbench.configuration import CONFIGS, Configuration, parse, read_toml
 from gripbench.envs.signals import NEW, record_type, signal
 from gripbench.errors import InputError, unknown
@@ -148,7 +148,7 @@ _STATE = np.dtype(
 )
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _count_teeth(time, elapsed, speed, new, spec, state):  # type: ignore[no-untyped-def]
     """Return the wheel speed [rad/s] that the times of the teeth give.
 
@@ -175,7 +175,7 @@ def _count_teeth(time, elapsed, speed, new, spec, state):  # type: ignore[no-unt
     return state.counted
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _measure(k, truth, specs, states, history, noise, walk, out):  # type: ignore[no-untyped-def]
     """Measure sample `k`: all arguments are rows of this sample, `history` a ring of the past."""
     time = truth[0]
@@ -226,7 +226,7 @@ def _measure(k, truth, specs, states, history, noise, walk, out):  # type: ignor
         out[spec.output] = value
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _measure_block(first, truth, specs, states, history, noise, walk, out):  # type: ignore[no-untyped-def]
     for i in range(truth.shape[0]):
         _measure(first + i, truth[i], specs, states, history, noise[i], walk[i], out[i])
@@ -416,7 +416,7 @@ class SensorLanes:
 _LANE_ARRAYS = ("_specs", "_states", "_history", "_noise", "_walk")
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _measure_lanes(lanes, samples, truth, specs, states, history, noise, walk, out):  # type: ignore[no-untyped-def]
     for lane in lanes:
         k = samples[lane]

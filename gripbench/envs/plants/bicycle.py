@@ -12,11 +12,11 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, Self
 
-import numba
 import numpy as np
 import numpy.typing as npt
 from pydantic import model_validator
 
+from gripbench.compilation import compiled
 from gripbench.envs.drivers.path_drivers import OFFSET, command, find_on_path, wrapped
 from gripbench.envs.plants.driven import DrivenScenario
 from gripbench.envs.plants.planar import plant
@@ -129,7 +129,7 @@ class BicycleScenario(DrivenScenario):
         return self
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def derivative(x, u, p, dx):  # type: ignore[no-untyped-def]
     """Fill `dx` with the time derivative of the state; return the axles' forces [N].
 
@@ -153,7 +153,7 @@ def derivative(x, u, p, dx):  # type: ignore[no-untyped-def]
     return front, rear
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _feel_bank(run):  # type: ignore[no-untyped-def]
     place = min(max(run.state[plant.DISTANCE] / ROAD_SPACING, 0.0), run.profile.shape[0] - 2.000001)
     first = int(place)
@@ -163,7 +163,7 @@ def _feel_bank(run):  # type: ignore[no-untyped-def]
     run.inputs[plant.GRAVITY_Y] = -GRAVITY * math.sin(bank)
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _write(run, k, truth, at):  # type: ignore[no-untyped-def]
     x, p, row = run.state, run.plant[0], truth[at]
     front, rear = derivative(x, run.inputs, p, run.work[0])
@@ -191,7 +191,7 @@ def _write(run, k, truth, at):  # type: ignore[no-untyped-def]
     row.force_y_rear = rear
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def begin(run, speed, truth):  # type: ignore[no-untyped-def]
     """Put the vehicle at the origin of the track at a speed [m/s]; write the first sample."""
     run.state[plant.V_X] = speed
@@ -201,7 +201,7 @@ def begin(run, speed, truth):  # type: ignore[no-untyped-def]
     _write(run, 0, truth, 0)
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def decide(run, k):  # type: ignore[no-untyped-def]
     """Write the driver's steering from sample `k` to the next into the run."""
     planned = run.planned[min(k + 1, run.planned.shape[0] - 1)]
@@ -211,7 +211,7 @@ def decide(run, k):  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def act(run, k, parts, steer, truth, at):  # type: ignore[no-untyped-def]
     """Steer to an angle [rad] up to sample `k`, write that into row `at`; return a code."""
     x, u, p = run.state, run.inputs, run.plant[0]
@@ -244,7 +244,7 @@ def act(run, k, parts, steer, truth, at):  # type: ignore[no-untyped-def]
     return GOES_ON
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def roll_out(run, parts, truth):  # type: ignore[no-untyped-def]
     """Run from the first sample to the end; return the number of samples and a code."""
     for k in range(1, truth.shape[0]):

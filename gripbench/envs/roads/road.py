@@ -12,11 +12,11 @@ import zlib
 from dataclasses import dataclass
 from typing import Self
 
-import numba
 import numpy as np
 import numpy.typing as npt
 from pydantic import Field, model_validator
 
+from gripbench.compilation import compiled
 from gripbench.configuration import Configuration
 from gripbench.envs.plants.planar import plant
 from gripbench.envs.vehicles import GRAVITY
@@ -231,7 +231,7 @@ def disturb_field(
     return added
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def feel_road(x, p, friction, profile, u):  # type: ignore[no-untyped-def]
     """Write the inputs `u` that the place on the road gives the state `x`: gravity, friction."""
     place = min(max(x[plant.DISTANCE] / SPACING, 0.0), profile.shape[0] - 2.000001)

@@ -6,12 +6,12 @@ contact patch (Pacejka, Tire and Vehicle Dynamics, section 3.2; equation 15 of Y
 
 from __future__ import annotations
 
-import numba
+from gripbench.compilation import inlined
 
 _SLIDING = 3.0
 
 
-@numba.njit(inline="always", error_model="numpy")
+@inlined
 def secant(s):  # type: ignore[no-untyped-def]
     """Return f(s) / s for s >= 0."""
     if s < _SLIDING:
@@ -19,7 +19,7 @@ def secant(s):  # type: ignore[no-untyped-def]
     return 1.0 / s
 
 
-@numba.njit(inline="always", error_model="numpy")
+@inlined
 def tangent(s):  # type: ignore[no-untyped-def]
     """Return f'(s) for s >= 0."""
     return (1.0 - s / _SLIDING) ** 2 if s < _SLIDING else 0.0

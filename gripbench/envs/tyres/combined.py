@@ -13,8 +13,7 @@ from __future__ import annotations
 
 import math
 
-import numba
-
+from gripbench.compilation import compiled
 from gripbench.envs.tyres import brush, dugoff, fitted_curve, magic_formula
 
 BRUSH = 0
@@ -31,7 +30,7 @@ SHAPES: dict[str, int] = {
 """Code of each shape by the name that scenario files use."""
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def secant(shape, s):  # type: ignore[no-untyped-def]
     """Return f(s) / s, the secant slope of a shape at the normalised slip s >= 0; 1 at s = 0.
 
@@ -51,7 +50,7 @@ def secant(shape, s):  # type: ignore[no-untyped-def]
     return magic_formula.secant(s)
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def tangent(shape, s):  # type: ignore[no-untyped-def]
     """Return f'(s), the slope of a shape at the normalised slip s >= 0; arguments as `secant`."""
     if shape == BRUSH:
@@ -63,7 +62,7 @@ def tangent(shape, s):  # type: ignore[no-untyped-def]
     return magic_formula.tangent(s)
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def combined_force(shape, slip_x, slip_y, stiffness_x, stiffness_y, capacity):  # type: ignore[no-untyped-def]
     """Return the tyre force (F_x, F_y) [N] in the axes of the wheel.
 

@@ -6,10 +6,10 @@ Sebsadji (2008).
 
 from __future__ import annotations
 
-import numba
+from gripbench.compilation import inlined
 
 
-@numba.njit(inline="always", error_model="numpy")
+@inlined
 def secant(s):  # type: ignore[no-untyped-def]
     """Return f(s) / s for s >= 0."""
     if s < 0.5:
@@ -17,7 +17,7 @@ def secant(s):  # type: ignore[no-untyped-def]
     return (1.0 - 0.25 / s) / s
 
 
-@numba.njit(inline="always", error_model="numpy")
+@inlined
 def tangent(s):  # type: ignore[no-untyped-def]
     """Return f'(s) for s >= 0."""
     return 1.0 if s < 0.5 else 0.25 / (s * s)

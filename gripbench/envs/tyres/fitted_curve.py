@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-import numba
+from gripbench.compilation import inlined
 
 _C1, _C2, _C3 = 1.2801, 23.99, 0.52
 _PEAK_SLIP = math.log(_C1 * _C2 / _C3) / _C2
@@ -20,7 +20,7 @@ _LOCKED = 1.0 / _SLIP
 _LOCKED_FORCE = (_C1 * (1.0 - math.exp(-_C2)) - _C3) / _PEAK
 
 
-@numba.njit(inline="always", error_model="numpy")
+@inlined
 def secant(s):  # type: ignore[no-untyped-def]
     """Return f(s) / s for s >= 0."""
     if s < 1e-6:
@@ -31,7 +31,7 @@ def secant(s):  # type: ignore[no-untyped-def]
     return (-_C1 * math.expm1(-_C2 * slip) - _C3 * slip) / (_PEAK * s)
 
 
-@numba.njit(inline="always", error_model="numpy")
+@inlined
 def tangent(s):  # type: ignore[no-untyped-def]
     """Return f'(s) for s >= 0."""
     if s >= _LOCKED:

@@ -9,15 +9,13 @@ from __future__ import annotations
 
 from math import atan, cos, sin
 
-import numba
-
-_inline = numba.njit(inline="always", error_model="numpy")
+from gripbench.compilation import inlined
 
 CRAWL_SPEED = 0.1
 """Speed [m/s] below which the slip ratio's denominator stays constant: no division by zero."""
 
 
-@_inline
+@inlined
 def slip_ratio(rolling_speed, speed):  # type: ignore[no-untyped-def]
     """Return the slip ratio of eq. 5, in one form for traction and braking.
 
@@ -35,7 +33,7 @@ def slip_ratio(rolling_speed, speed):  # type: ignore[no-untyped-def]
     return (rolling_speed - speed) / max(abs(rolling_speed), abs(speed), CRAWL_SPEED)
 
 
-@_inline
+@inlined
 def slip_ratio_slopes(rolling_speed, speed):  # type: ignore[no-untyped-def]
     """Return the derivatives of `slip_ratio` to the rolling speed and to the speed [s/m]."""
     rolling, moving = abs(rolling_speed), abs(speed)
@@ -49,7 +47,7 @@ def slip_ratio_slopes(rolling_speed, speed):  # type: ignore[no-untyped-def]
     return 1.0 / moving, -1.0 / moving - difference * sign / (moving * moving)
 
 
-@_inline
+@inlined
 def magic_formula(slip, stiffness, shape, curvature):  # type: ignore[no-untyped-def]
     """Return the tyre force of eq. 4 over its peak value D = mu F_z.
 
@@ -64,7 +62,7 @@ def magic_formula(slip, stiffness, shape, curvature):  # type: ignore[no-untyped
     return sin(shape * atan(stretched - curvature * (stretched - atan(stretched))))
 
 
-@_inline
+@inlined
 def magic_formula_slope(slip, stiffness, shape, curvature):  # type: ignore[no-untyped-def]
     """Return the value of `magic_formula` and its derivative to the slip ratio."""
     stretched = stiffness * slip

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import math
 
-import numba
+from gripbench.compilation import inlined
 
 MAGIC_SHAPE = 1.3
 """Shape factor C."""
 
 
-@numba.njit(inline="always", error_model="numpy")
+@inlined
 def secant(s):  # type: ignore[no-untyped-def]
     """Return f(s) / s for s >= 0."""
     if s < 1e-6:
@@ -21,7 +21,7 @@ def secant(s):  # type: ignore[no-untyped-def]
     return math.sin(MAGIC_SHAPE * math.atan(s / MAGIC_SHAPE)) / s
 
 
-@numba.njit(inline="always", error_model="numpy")
+@inlined
 def tangent(s):  # type: ignore[no-untyped-def]
     """Return f'(s) for s >= 0."""
     inner = s / MAGIC_SHAPE

@@ -16,9 +16,9 @@ from __future__ import annotations
 
 from math import isfinite
 
-import numba
 import numpy as np
 
+from gripbench.compilation import inlined
 from gripbench.envs.plants.longitudinal.plant import (
     compiled,
     derivatives,
@@ -28,8 +28,6 @@ from gripbench.envs.plants.longitudinal.plant import (
     rates,
     state_rates,
 )
-
-_inline = numba.njit(inline="always", error_model="numpy")
 
 ROS3, RK4 = 0, 1
 INTEGRATORS = {"ros3": ROS3, "rk4": RK4}
@@ -49,7 +47,7 @@ _M2, _M3 = 6.1697947043828245592553615689730, -0.4277225654321857332623837380651
 _E1, _E2, _E3 = 0.5, -2.9079558716805469821718236208017, 0.22354069897811569627360909276199
 
 
-@_inline
+@inlined
 def _solve_arrow(b0, b1, b2, arrow):  # type: ignore[no-untyped-def]
     """Return the solution k of (shift I - J) k = b for the arrow matrix J, axles eliminated."""
     to_front, to_rear, j10, j20, inverse, front, rear = arrow

@@ -13,9 +13,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from math import sin
 
-import numba
 import numpy as np
 
+from gripbench.compilation import compiled, inlined
 from gripbench.envs.tyres.combined import MAGIC_FORMULA, SHAPES, secant, tangent
 from gripbench.envs.tyres.longitudinal import (
     magic_formula,
@@ -85,9 +85,6 @@ TYRE_TYPE = np.dtype(
 )
 """Force of each axle over its peak mu F_z, and its slopes to wheel speed and speed."""
 
-compiled = numba.njit(cache=True, error_model="numpy", nogil=True)
-_inline = numba.njit(inline="always", error_model="numpy")
-
 
 def plant_record(
     vehicle: Mapping[str, float] | CarOnRoad, tyre: str = "magic_formula"
@@ -123,23 +120,23 @@ def plant_record(
     return plant
 
 
-@_inline
+@inlined
 def _fade(speed):  # type: ignore[no-untyped-def]
     return max(-1.0, min(1.0, speed / HOLD_SPEED))
 
 
-@_inline
+@inlined
 def _fade_slope(speed):  # type: ignore[no-untyped-def]
     return 1.0 / HOLD_SPEED if abs(speed) < HOLD_SPEED else 0.0
 
 
-@_inline
+@inlined
 def _wheel_torque(torque, wheel_speed, radius):  # type: ignore[no-untyped-def]
     """Return the torque that acts: a brake (negative torque) only opposes the rotation."""
     return torque if torque >= 0.0 else torque * _fade(wheel_speed * radius)
 
 
-@_inline
+@inlined
 def _share_of_peak(slip, plant):  # type: ignore[no-untyped-def]
     """Return the tyre force over its peak mu F_z."""
     if plant.tyre == MAGIC_FORMULA:
@@ -148,19 +145,19 @@ def _share_of_peak(slip, plant):  # type: ignore[no-untyped-def]
     return secant(plant.tyre, abs(normalised)) * normalised
 
 
-@_inline
+@inlined
 def tyre_force(wheel_speed, speed, mu, load, radius, plant):  # type: ignore[no-untyped-def]
     """Return the longitudinal tyre force of an axle [N], eq. 4-5."""
     return mu * load * _share_of_peak(slip_ratio(radius * wheel_speed, speed), plant)
 
 
-@_inline
+@inlined
 def gravity_along(inputs):  # type: ignore[no-untyped-def]
     """Return gravity's component along the road [m/s^2], positive downhill."""
     return GRAVITY * sin(inputs.road_grade)
 
 
-@_inline
+@inlined
 def rates(speed, front, rear, force_front, force_rear, gravity, inputs, plant):  # type: ignore[no-untyped-def]
     """Return the time derivative of the state for given tyre forces, eq. 2-3.
 
@@ -187,7 +184,7 @@ def rates(speed, front, rear, force_front, force_rear, gravity, inputs, plant): 
     return speed_rate, front_rate, rear_rate
 
 
-@_inline
+@inlined
 def state_rates(speed, front, rear, gravity, inputs, plant):  # type: ignore[no-untyped-def]
     """Return the time derivative of the state, eq. 2-5; arguments as for `rates`."""
     force_front = tyre_force(
@@ -215,7 +212,7 @@ def derivatives(x, inputs, plant, dx):  # type: ignore[no-untyped-def]
     dx[0], dx[1], dx[2] = state_rates(x[0], x[1], x[2], gravity_along(inputs), inputs, plant)
 
 
-@_inline
+@inlined
 def _tyre_slopes(wheel_speed, speed, radius, plant):  # type: ignore[no-untyped-def]
     """Return an axle's force over its peak, and its slopes to wheel speed and speed."""
     rolling = radius * wheel_speed
@@ -241,12 +238,12 @@ def evaluate_tyres(x, plant, tyres):  # type: ignore[no-untyped-def]
     )
 
 
-@_inline
+@inlined
 def _torque_slope(torque, wheel_speed, radius):  # type: ignore[no-untyped-def]
     return 0.0 if torque >= 0.0 else torque * radius * _fade_slope(wheel_speed * radius)
 
 
-@_inline
+@inlined
 def jacobian(speed, front, rear, inputs, plant, tyres):  # type: ignore[no-untyped-def]
     """Return the Jacobian of the time derivative: an arrow, because the axles do not couple.
 

@@ -15,10 +15,10 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
+from gripbench.compilation import compiled
 from gripbench.envs.tyres.combined import SHAPES, combined_force
 from gripbench.envs.vehicles import GRAVITY, CarOnRoad, Vehicle, on_road, require
 from gripbench.errors import InputError
@@ -172,7 +172,7 @@ def plant_record(tyre: str, vehicle: Vehicle | CarOnRoad) -> npt.NDArray[np.void
     return record
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def rolling_speed(speed):  # type: ignore[no-untyped-def]
     """Return |speed|, below `SLOW_ROLLING` a parabola with half of it as its least value."""
     size = abs(speed)
@@ -181,7 +181,7 @@ def rolling_speed(speed):  # type: ignore[no-untyped-def]
     return 0.5 * (SLOW_ROLLING + size * size / SLOW_ROLLING)
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def wheel_forces(x, u, p, wheels):  # type: ignore[no-untyped-def]
     """Fill `wheels`, shape (4, WHEEL_COLUMNS); return force along x and y [N], moment [N m].
 
@@ -254,7 +254,7 @@ def wheel_forces(x, u, p, wheels):  # type: ignore[no-untyped-def]
     return total_x, total_y, moment
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def hold_stiffness(x, p, u):  # type: ignore[no-untyped-def]
     """Write the stiffness of each tyre under its present load, over that at its static load.
 
@@ -277,7 +277,7 @@ def hold_stiffness(x, p, u):  # type: ignore[no-untyped-def]
         u[GROWTH + i] = (load / nominal) ** p.load_exponent
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def derivative(x, u, p, wheels, dx):  # type: ignore[no-untyped-def]
     """Fill `dx` with the time derivative of the state under held inputs.
 
@@ -320,7 +320,7 @@ def derivative(x, u, p, wheels, dx):  # type: ignore[no-untyped-def]
     dx[STEER] = u[STEER_RATE]
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def parts_of_step(x, u, p):  # type: ignore[no-untyped-def]
     """Return into how many parts a step must be cut: more at walking pace, else 1."""
     tyre = p.tyre_x * p.wheel_radius * p.wheel_radius / rolling_speed(x[V_X])
@@ -334,7 +334,7 @@ def parts_of_step(x, u, p):  # type: ignore[no-untyped-def]
     return int(min(math.ceil(stiffest / p.spin_inertia * STEP / _STIFFEST), _MOST_PARTS))
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def advance_step(x, u, p, wheels, work):  # type: ignore[no-untyped-def]
     """Advance the state by `STEP` in place, by the classical Runge-Kutta method.
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
+from gripbench.compilation import compiled
 from gripbench.envs.drivers.path_drivers import ASTRAY, MEMORY, OFFSET, command, find_on_path
 from gripbench.envs.plants.planar import plant
 from gripbench.envs.plants.planar.truth import write_truth
@@ -85,7 +85,7 @@ def to_earth(points: npt.NDArray[np.float64], heading: float) -> npt.NDArray[np.
     return np.asarray(points @ np.array([[cos, sin], [-sin, cos]]))
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def begin(run, speed, truth, columns):  # type: ignore[no-untyped-def]
     """Put the vehicle at the origin of the track, rolling at a speed; write the first sample.
 
@@ -111,7 +111,7 @@ def begin(run, speed, truth, columns):  # type: ignore[no-untyped-def]
     _write(run, 0, truth, columns, 0)
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def decide(run, k):  # type: ignore[no-untyped-def]
     """Write the driver's action from sample `k` to the next into the run."""
     time = k * run.driver[0].sample_time
@@ -122,7 +122,7 @@ def decide(run, k):  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def act(run, k, parts, action, truth, columns, at):  # type: ignore[no-untyped-def]
     """Hold an action up to sample `k`, write that sample into row `at`; return a code.
 
@@ -159,7 +159,7 @@ def act(run, k, parts, action, truth, columns, at):  # type: ignore[no-untyped-d
     return _end_of(run)
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def roll_out(run, parts, truth, columns):  # type: ignore[no-untyped-def]
     """Run from the first sample to the end; return the number of samples and a code."""
     code = GOES_ON
@@ -175,7 +175,7 @@ def roll_out(run, parts, truth, columns):  # type: ignore[no-untyped-def]
     return count, code
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _write(run, k, truth, columns, at):  # type: ignore[no-untyped-def]
     site = run.site
     write_truth(
@@ -185,7 +185,7 @@ def _write(run, k, truth, columns, at):  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _end_of(run):  # type: ignore[no-untyped-def]
     """Return the code of the reason to end here, `GOES_ON` if there is none."""
     x, wheels = run.state, run.wheels

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import math
 
-import numba
-
+from gripbench.compilation import compiled
 from gripbench.envs.drivers.path_drivers import wrapped
 from gripbench.envs.plants.planar import plant
 from gripbench.envs.signals import record_type
@@ -73,7 +72,7 @@ TRUTH = record_type(
 _FIRST_WHEEL = len(_SCALARS)
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def write_truth(time, x, u, p, heading, north, up, disturbance, wheels, dx, row, columns):  # type: ignore[no-untyped-def]
     """Write one sample of the truth.
 
@@ -158,7 +157,7 @@ def write_truth(time, x, u, p, heading, north, up, disturbance, wheels, dx, row,
     row.utilisation = math.hypot(along, across) / (row.mu * GRAVITY)
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _write_wheels(x, u, p, wheels, row, columns):  # type: ignore[no-untyped-def]
     available = 0.0
     used = 0.0
