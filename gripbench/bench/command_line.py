@@ -8,11 +8,12 @@ import os
 import pkgutil
 import signal
 import sys
-from typing import NoReturn
+from typing import Annotated, NoReturn
 
 import typer
 
 from gripbench.bench import commands
+from gripbench.compilation import declare_only
 from gripbench.errors import GripbenchError
 
 
@@ -25,14 +26,23 @@ def application() -> typer.Typer:
         add_completion=False,
         pretty_exceptions_enable=False,
     )
+    app.callback()(_options)
     for module in pkgutil.iter_modules(commands.__path__):
         importlib.import_module(f"{commands.__name__}.{module.name}").register(app)
     return app
 
 
+def _options(
+    version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
+) -> None:
+    """A benchmark of estimators of tyre-road friction and vehicle sideslip."""
+
+
 def main() -> None:
     """Run the command line; end with 2 on wrong usage or input, 130 when interrupted."""
     gc.set_threshold(200_000)  # thousands of stored rows are read: looking for cycles costs as much
+    if _only_tells(sys.argv[1:]):
+        declare_only()
     try:
         code = application()(standalone_mode=False)
     except GripbenchError as error:
@@ -56,6 +66,14 @@ def main() -> None:
             sys.exit(2)
         _stop(message[:1].lower() + message[1:], 2)
     sys.exit(code or 0)
+
+
+def _only_tells(arguments: list[str]) -> bool:
+    """Return whether a command line asks what there is and runs no compiled function."""
+    command, *rest = arguments or [""]
+    return command == "list" or (
+        command == "show" and not any(name.startswith("recording:") for name in rest)
+    )
 
 
 def _stop(message: str, code: int) -> NoReturn:

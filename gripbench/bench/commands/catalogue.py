@@ -8,6 +8,8 @@ from typing import Annotated
 
 import typer
 
+from gripbench.bench.commands import RUN
+
 
 class Kind(StrEnum):
     """What can be listed."""
@@ -25,12 +27,12 @@ class Kind(StrEnum):
 
 def register(app: typer.Typer) -> None:
     """Add the commands."""
-    app.command("list")(list_kind)
-    app.command("show")(show)
+    app.command("list", rich_help_panel=RUN)(list_kind)
+    app.command("show", rich_help_panel=RUN)(show)
     group = typer.Typer(no_args_is_help=True, help="Compare methods.")
     group.command("table")(methods_table)
     group.callback()(_methods)
-    app.add_typer(group, name="methods")
+    app.add_typer(group, name="methods", rich_help_panel=RUN)
 
 
 def _methods() -> None:

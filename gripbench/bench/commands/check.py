@@ -8,15 +8,16 @@ from typing import Annotated
 import typer
 
 from gripbench.bench.running.store import DEFAULT_RESULTS
+from gripbench.bench.commands import RUN
 
 
 def register(app: typer.Typer) -> None:
     """Add the commands."""
-    app.command("check")(check)
+    app.command("check", rich_help_panel=RUN)(check)
     group = typer.Typer(no_args_is_help=True, help="Write a file to start from.")
     group.callback()(_new)
     group.command("method")(new_method)
-    app.add_typer(group, name="new")
+    app.add_typer(group, name="new", rich_help_panel=RUN)
 
 
 def _new() -> None:

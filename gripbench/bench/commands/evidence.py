@@ -6,12 +6,14 @@ from typing import Annotated
 
 import typer
 
+from gripbench.bench.commands import REPRODUCE
+
 PAPERS = ("li2014",)
 
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
-    app.command("evidence")(evidence)
+    app.command("evidence", rich_help_panel=REPRODUCE)(evidence)
 
 
 def evidence(

@@ -7,12 +7,13 @@ from typing import Annotated
 
 import typer
 
+from gripbench.bench.commands import REPRODUCE
 from gripbench.bench.running.store import DEFAULT_RESULTS
 
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
-    app.command("figures")(figures)
+    app.command("figures", rich_help_panel=REPRODUCE)(figures)
 
 
 def figures(

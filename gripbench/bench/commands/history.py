@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from gripbench.bench.commands import PUBLISH
 from gripbench.bench.running.store import DEFAULT_RESULTS
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ def register(app: typer.Typer) -> None:
     history.command("add")(add)
     history.command("show")(show)
     history.command("plot")(plot)
-    app.add_typer(history, name="history")
+    app.add_typer(history, name="history", rich_help_panel=PUBLISH)
 
 
 def add(

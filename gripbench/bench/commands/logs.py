@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from gripbench.bench.commands import LOGS
+
 if TYPE_CHECKING:
     from gripbench.bench.publishing.tables import Table
     from gripbench.bench.running.recorded import RecordedScore
@@ -17,13 +19,13 @@ if TYPE_CHECKING:
 
 def register(app: typer.Typer) -> None:
     """Add the commands to the application."""
-    app.command("import")(import_)
+    app.command("import", rich_help_panel=LOGS)(import_)
     data = typer.Typer(help="Files of published recordings.", no_args_is_help=True)
     data.command("path")(path)
-    app.add_typer(data, name="data")
-    app.command("recordings")(recordings)
-    app.command("tune")(tune)
-    app.command("identify")(identify)
+    app.add_typer(data, name="data", rich_help_panel=LOGS)
+    app.command("recordings", rich_help_panel=LOGS)(recordings)
+    app.command("tune", rich_help_panel=LOGS)(tune)
+    app.command("identify", rich_help_panel=LOGS)(identify)
 
 
 def import_(

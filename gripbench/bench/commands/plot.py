@@ -7,12 +7,13 @@ from typing import Annotated
 
 import typer
 
+from gripbench.bench.commands import RUN
 from gripbench.bench.running.store import DEFAULT_RESULTS
 
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
-    app.command("plot")(plot)
+    app.command("plot", rich_help_panel=RUN)(plot)
 
 
 def plot(

@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from gripbench.bench.commands import PUBLISH
 from gripbench.bench.running.store import DEFAULT_RESULTS
 
 SEEDS = 20
@@ -18,7 +19,7 @@ SEEDS = 20
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
-    app.command("publish")(publish)
+    app.command("publish", rich_help_panel=PUBLISH)(publish)
 
 
 def publish(

@@ -7,12 +7,13 @@ from typing import Annotated
 
 import typer
 
+from gripbench.bench.commands import RANK
 from gripbench.bench.running.store import DEFAULT_RESULTS
 
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
-    app.command("rank")(rank)
+    app.command("rank", rich_help_panel=RANK)(rank)
 
 
 def rank(

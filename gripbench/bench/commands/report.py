@@ -7,12 +7,13 @@ from typing import Annotated
 
 import typer
 
+from gripbench.bench.commands import PUBLISH
 from gripbench.bench.running.store import DEFAULT_RESULTS
 
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
-    app.command("report")(report)
+    app.command("report", rich_help_panel=PUBLISH)(report)
 
 
 def report(

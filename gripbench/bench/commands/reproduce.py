@@ -7,12 +7,13 @@ from typing import Annotated
 
 import typer
 
+from gripbench.bench.commands import REPRODUCE
 from gripbench.bench.running.store import DEFAULT_RESULTS
 
 
 def register(app: typer.Typer) -> None:
     """Add the command to the application."""
-    app.command("reproduce")(reproduce)
+    app.command("reproduce", rich_help_panel=REPRODUCE)(reproduce)
 
 
 def reproduce(

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from gripbench.bench.commands import RANK
 from gripbench.bench.running.store import DEFAULT_RESULTS
 
 Results = Annotated[Path, typer.Option(help="Folder of the stored rows.")]
@@ -20,7 +21,7 @@ def register(app: typer.Typer) -> None:
     group.command("list")(list_rows)
     group.command("show")(show)
     group.command("prune")(prune)
-    app.add_typer(group, name="results")
+    app.add_typer(group, name="results", rich_help_panel=RANK)
 
 
 def list_rows(results: Results = DEFAULT_RESULTS) -> None:

@@ -7,12 +7,13 @@ from typing import Annotated
 
 import typer
 
+from gripbench.bench.commands import RUN
 from gripbench.bench.running.store import DEFAULT_RESULTS
 
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
-    app.command("run")(run)
+    app.command("run", rich_help_panel=RUN)(run)
 
 
 def run(

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import sys
+from typing import TYPE_CHECKING
 
-import pandas as pd
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -13,6 +13,9 @@ from rich.table import Table
 
 from gripbench.bench.ranking.summary import FOOTNOTE, failures, marked
 from gripbench.envs.signals import signal
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def console() -> Console:

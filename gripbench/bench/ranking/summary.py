@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from gripbench.bench.ranking.statistics import CONFIDENCE, draws, pooled_rms_interval
 from gripbench.bench.scoring.metric import pooled_rms
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 MARK = "†"
 """Follows the name of a method that reads a channel which no sensor in a vehicle gives."""
@@ -65,6 +67,8 @@ def summary(rows: pd.DataFrame) -> pd.DataFrame:
         "settled", "delay", "delay_low", "delay_high",
         "jumps", "jump_settled", "jump_delay", "jump_low", "jump_high",
     )  # fmt: skip
+    import pandas as pd
+
     return pd.DataFrame(lines, columns=list(columns))
 
 
