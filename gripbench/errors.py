@@ -69,11 +69,16 @@ def nearest(name: str, known: Iterable[str]) -> str:
     --------
     >>> nearest("masss", ["mass", "track"])
     "did you mean 'mass'?"
+    >>> nearest("gps", ["GPS receiver", "gyroscope"])
+    "did you mean 'GPS receiver'?"
     """
     options = sorted(known)
-    match = difflib.get_close_matches(name, options, n=1, cutoff=0.5)
+    lower = {option.lower(): option for option in reversed(options)}
+    given = name.lower()
+    match = difflib.get_close_matches(given, lower, n=1, cutoff=0.5)
+    match = match or [option for option in sorted(lower, key=len) if given and given in option]
     if match:
-        return f"did you mean '{match[0]}'?"
+        return f"did you mean '{lower[match[0]]}'?"
     if len(options) > _MOST_LISTED:
         return f"none of the {len(options)} known names is like it"
     return "known: " + ", ".join(options)

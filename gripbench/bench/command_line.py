@@ -12,6 +12,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
+from gripbench import __version__
 from gripbench.bench import commands
 from gripbench.compilation import declare_only
 from gripbench.errors import GripbenchError
@@ -26,16 +27,23 @@ def application() -> typer.Typer:
         add_completion=False,
         pretty_exceptions_enable=False,
     )
-    app.callback()(_options)
-    for module in pkgutil.iter_modules(commands.__path__):
-        importlib.import_module(f"{commands.__name__}.{module.name}").register(app)
+    app.callback(invoke_without_command=True)(_options)
+    names = [module.name for module in pkgutil.iter_modules(commands.__path__)]
+    order = commands.ORDER
+    for name in sorted(names, key=lambda name: order.index(name) if name in order else len(order)):
+        importlib.import_module(f"{commands.__name__}.{name}").register(app)
     return app
 
 
 def _options(
-    version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
+    version: Annotated[
+        bool, typer.Option("--version", is_eager=True, help="Print the version and exit.")
+    ] = False,
 ) -> None:
-    """A benchmark of estimators of tyre-road friction and vehicle sideslip."""
+    """Take what stands before a command."""
+    if version:
+        print(__version__)
+        raise typer.Exit
 
 
 def main() -> None:
@@ -71,8 +79,9 @@ def main() -> None:
 def _only_tells(arguments: list[str]) -> bool:
     """Return whether a command line asks what there is and runs no compiled function."""
     command, *rest = arguments or [""]
+    runs = ("recording:", "gripbench/")  # a log is read, an environment is made
     return command == "list" or (
-        command == "show" and not any(name.startswith("recording:") for name in rest)
+        command == "show" and not any(name.startswith(runs) for name in rest)
     )
 
 

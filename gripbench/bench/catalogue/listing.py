@@ -5,11 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from gripbench.bench.catalogue.environments import (
-    NAMESPACE,
-    environment_lines,
-    environment_settings,
-)
 from gripbench.bench.catalogue.registry import (
     all_scenario_files,
     built_in_methods,
@@ -53,7 +48,12 @@ def settings(name: str) -> dict[str, Any]:
     InputError
         If nothing has this name; the message names the nearest one.
     """
-    if name in population_files() or _is_population(name):
+    kind = _kind_of_file(name) if name.endswith(".toml") else ""
+    if name in vehicle_files() or kind == "vehicle":
+        return {"kind": "vehicle", **_vehicle(name)}
+    if name in suite_files() or kind == "suite":
+        return {"kind": "suite", **load_suite(name).model_dump(mode="json")}
+    if name in population_files() or kind == "population":
         return {"kind": "population", **load_population(name).model_dump(mode="json")}
     if name in grade_files():
         return {"kind": "instruments", **load_grade(name).model_dump(mode="json")}  # type: ignore[union-attr]
@@ -62,14 +62,14 @@ def settings(name: str) -> dict[str, Any]:
         scenario = find_scenario(name)
         sensors = {key: item.model_dump() for key, item in sensors_at(scenario).items()}
         return {"kind": "scenario", **scenario.model_dump(mode="json"), "sensors": sensors}
-    if name in suite_files():
-        return {"kind": "suite", **load_suite(name).model_dump(mode="json")}
-    if name in vehicle_files():
-        return {"kind": "vehicle", **_vehicle(name)}
-    if name.startswith(NAMESPACE):
+    if name.startswith("gripbench/"):
+        from gripbench.bench.catalogue.environments import environment_settings  # Gymnasium
+
         return {"kind": "environment", **environment_settings(name)}
     if name in SIGNALS:
-        return {"kind": "signal", **vars(signal(name))}
+        entry = signal(name)
+        shown = {"angle": entry.angle, "display_unit": entry.display_unit}
+        return {"kind": "signal", **vars(entry), **shown}
     if ".py" in name or name.partition(":")[0].partition("@")[0] in method_names():
         return {"kind": "method", **_method(name)}
     known = [
@@ -79,12 +79,21 @@ def settings(name: str) -> dict[str, Any]:
     raise unknown("name", name, known)
 
 
-def _is_population(name: str) -> bool:
-    """Tell whether a TOML file holds a population and no scenario."""
-    if not name.endswith(".toml"):
-        return False
+def _kind_of_file(name: str) -> str:
+    """Tell what a TOML file holds by the keys that only its kind has; empty: a scenario."""
     content = read_toml(Path(name))
-    return "world" not in content and bool({"friction_prior", "effects", *TABLES} & set(content))
+    if "world" not in content:
+        for kind, keys in _KEYS_OF_FILES.items():
+            if keys & set(content):
+                return kind
+    return ""
+
+
+_KEYS_OF_FILES = {
+    "vehicle": {"parameters"},
+    "suite": {"scenarios", "methods"},
+    "population": {"friction_prior", "effects", *TABLES},
+}
 
 
 def sensor_needs(target: str = "", everything: bool = False) -> tuple[tuple[str, ...], Lines]:
@@ -217,6 +226,12 @@ def _signal_lines() -> tuple[tuple[str, ...], Lines]:
     ]
 
 
+def _environment_lines() -> tuple[tuple[str, ...], Lines]:
+    from gripbench.bench.catalogue.environments import environment_lines  # Gymnasium
+
+    return environment_lines()
+
+
 def _suite_lines() -> tuple[tuple[str, ...], Lines]:
     lines: Lines = []
     for name in suite_files():
@@ -291,5 +306,5 @@ _LISTS = {
     "vehicles": _vehicle_lines,
     "signals": _signal_lines,
     "suites": _suite_lines,
-    "environments": environment_lines,
+    "environments": _environment_lines,
 }

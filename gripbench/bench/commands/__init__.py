@@ -5,3 +5,6 @@ RUN = "Run methods"
 RANK = "Rank them"
 PUBLISH = "Publish results"
 LOGS = "Logs of real vehicles"
+
+ORDER = ("reproduce", "evidence", "figures", "run", "check", "plot", "catalogue", "rank", "results")
+"""Modules whose commands come first in `--help`, in this order."""

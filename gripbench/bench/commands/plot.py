@@ -25,7 +25,12 @@ def plot(
             "None: the truth alone."
         ),
     ] = "",
-    signal: Annotated[str, typer.Option(help="What to draw, such as mu_front or sideslip.")] = "mu",
+    signal: Annotated[
+        str,
+        typer.Option(
+            help="What to draw, such as mu_front or sideslip; by default what the methods estimate."
+        ),
+    ] = "",
     seed: Annotated[int, typer.Option(min=0, help="Seed of the run.")] = 0,
     start: Annotated[float | None, typer.Option(help="From this time [s].")] = None,
     end: Annotated[float | None, typer.Option(help="Up to this time [s].")] = None,
@@ -36,17 +41,19 @@ def plot(
     dpi: Annotated[int, typer.Option(min=30, max=1200, help="Dots an inch of the PNG.")] = 150,
 ) -> None:
     """Draw a signal of one run, truth against estimates and their errors, as PNG and PDF."""
-    from gripbench.bench.publishing.figures.run_plot import run_plot
+    from gripbench.bench.publishing.figures.run_plot import run_plot, usual_signal
     from gripbench.bench.publishing.figures.runs import Runs
     from gripbench.bench.publishing.figures.style import save, style
     from gripbench.writing import check_writable
 
     chosen = split_methods(methods)
+    runs = Runs()
+    signal = signal or usual_signal(runs, scenario, chosen, seed)
     if output is None:
         output = results / "plots" / f"{Path(scenario).stem}_{signal}_{seed}"
     check_writable(output.parent / f"{output.name}.png")
     with style():
-        figure = run_plot(Runs(), scenario, chosen, signal, seed, start, end)
+        figure = run_plot(runs, scenario, chosen, signal, seed, start, end)
         paths = save(figure, output.parent, output.name.removesuffix(".png"), dpi)
     typer.echo("Written: " + ", ".join(str(path) for path in paths))
 

@@ -57,6 +57,7 @@ def rank(
     from gripbench.errors import InputError
 
     rows = read_rows(results, tuple(scenario or ()))
+    check_names(results, scenario or [], set(rows["scenario"]))
     if rows.empty:
         raise InputError(f"{results}: no stored rows to rank; 'gripbench run' makes them")
     found = boards(
@@ -77,3 +78,19 @@ def rank(
         if wins:
             print()
             show(wins_table(board), format_)
+
+
+def check_names(results: Path, given: list[str], stored: set[str]) -> None:
+    """Raise InputError for a scenario that has no stored rows, or that nobody knows."""
+    from gripbench.bench.catalogue.registry import all_scenario_files
+    from gripbench.errors import InputError, unknown
+
+    for name in given:
+        if name in stored:
+            continue
+        known = all_scenario_files()
+        if name.partition("@")[0] not in known and ":" not in name:
+            raise unknown("scenario", name, {*known, *stored})
+        raise InputError(
+            f"{results}: no stored rows of '{name}'; 'gripbench run --scenario {name}' makes them"
+        )

@@ -19,20 +19,24 @@ def register(app: typer.Typer) -> None:
 def run(
     suite: Annotated[str, typer.Option(help="A suite's name or TOML file.")] = "",
     scenario: Annotated[
-        list[str] | None, typer.Option(help="A scenario's name or TOML file; repeat for more.")
+        list[str] | None,
+        typer.Option(metavar="NAME", help="A scenario's name or TOML file; repeat for more."),
     ] = None,
     recording: Annotated[
         list[str] | None,
         typer.Option(
+            metavar="NAME",
             help="A published recording's name, or the folder of an imported one; its windows are "
-            "the seeds. Repeat for more."
+            "the seeds. Repeat for more.",
         ),
     ] = None,
     method: Annotated[
         list[str] | None,
         typer.Option(
-            help="NAME[:VARIANT][@PARAMETER=NUMBER,...] or FILE.py:CLASS; repeat for more. "
-            "With a suite, they come on top of its methods."
+            metavar="METHOD",
+            help=r"NAME[:VARIANT]\[@PARAMETER=NUMBER,...] or FILE.py:CLASS[:VARIANT]..., repeat for "
+            "more. With a suite they come on top of its methods; without a suite and methods, all "
+            "built-in ones run that fit.",
         ),
     ] = None,
     level: Annotated[

@@ -8,12 +8,21 @@ from typing import Any
 
 import pandas as pd
 
-from gripbench.bench.catalogue.registry import choose_method, find_scenario, load_suite
+from gripbench.bench.catalogue.registry import (
+    MethodSpec,
+    built_in_methods,
+    choose_method,
+    find_scenario,
+    load_suite,
+)
 from gripbench.bench.running.backends import Backend
+from gripbench.bench.running.execution import missing
+from gripbench.bench.running.recorded_scenarios import recording_of
 from gripbench.bench.running.rows import Row, frame_of
 from gripbench.bench.running.runner import Plan, run_plan
 from gripbench.bench.running.sandbox import Limits
 from gripbench.bench.running.store import DEFAULT_RESULTS, Store
+from gripbench.bench.scoring.scoring import targets_of
 from gripbench.envs.scenarios import LEVELS, Scenario
 from gripbench.envs.worlds import at_level
 from gripbench.errors import InputError
@@ -47,7 +56,7 @@ def run(
         Names, paths of TOML files, `recording:NAME` or `recording:FOLDER`, or scenarios.
     methods
         Names (`name[:variant][@parameter=number,...]`), files (`file.py:Class`), classes, or
-        instances.
+        instances. Without a suite and methods: all built-in ones that fit.
     seeds
         Number of seeds from 0, `"A:B"` for A to B-1, or a range; by default the suite's, else 1.
         The seeds of a recording are its windows, by default all of them.
@@ -125,11 +134,12 @@ def plan_of(
     specs += [spec for spec in map(choose_method, methods) if spec.label not in labels]
     if not chosen:
         raise InputError("nothing to run: give a suite or a scenario")
-    if not specs:
-        raise InputError("nothing to run: give a suite or a method")
     found = [item if isinstance(item, Scenario) else find_scenario(item) for item in chosen]
     if level is not None:
         found = [at_level(item, level) for item in found]
+    specs = specs or fitting(found)
+    if not specs:
+        raise InputError("nothing to run: no built-in method fits; give a suite or a method")
     plan = Plan(
         scenarios=tuple(found),
         methods=tuple(specs),
@@ -143,6 +153,23 @@ def plan_of(
                 f"0:{getattr(scenario, 'runs', 0)}"
             )
     return plan
+
+
+def fitting(scenarios: Sequence[Scenario]) -> list[MethodSpec]:
+    """Return the built-in methods that some scenario gives all channels, parameters and a truth."""
+    runs = [
+        recording_of(scenario, 0) for scenario in scenarios if not getattr(scenario, "absent", "")
+    ]
+    specs = [choose_method(name) for name in built_in_methods()]
+    return [
+        spec
+        for spec in specs
+        if any(
+            not missing(spec.declaration, run.vehicle, run.observations.dtype.names or ())
+            and targets_of(spec.declaration.estimates, run)
+            for run in runs
+        )
+    ]
 
 
 def seeds_of(given: int | str | range | None) -> range:

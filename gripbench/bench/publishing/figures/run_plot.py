@@ -17,7 +17,7 @@ from gripbench.bench.publishing.figures.style import (
     new_figure,
     series_style,
 )
-from gripbench.envs.signals import VARIANCE, signal
+from gripbench.envs.signals import VARIANCE, difference, signal
 from gripbench.errors import InputError, unknown
 
 if TYPE_CHECKING:
@@ -28,6 +28,25 @@ DEVIATIONS = 1.96
 
 MOST_POINTS = 4000
 """A curve of more points than this is thinned: none of them could be told apart."""
+
+
+_USUAL = ("mu", "mu_front", "sideslip", "speed_x")
+
+
+def usual_signal(runs: Runs, scenario: str, methods: Sequence[str], seed: int = 0) -> str:
+    """Return what is drawn of a run unless one asks: what all methods estimate, friction first.
+
+    Parameters
+    ----------
+    runs, scenario, methods, seed
+        As `run_plot` takes them.
+    """
+    known = runs.recording(scenario, seed).truth.dtype.names or ()
+    found = [name for name in dict.fromkeys((*_USUAL, *known)) if name in known and name != "time"]
+    for method in methods:
+        estimates = runs.method(method).declaration.estimates
+        found = [name for name in found if name in estimates] or found
+    return found[0]
 
 
 def run_plot(
@@ -84,7 +103,8 @@ def run_plot(
         values = scale * estimates[name]
         line(rows[0], time[shown], values, spec.label, look, index / len(methods))
         line(
-            rows[1], time[shown], values - scale * truth[name][shown], spec.label, look,
+            rows[1], time[shown],
+            scale * difference(name, estimates[name], truth[name][shown]), spec.label, look,
             index / len(methods),
         )  # fmt: skip
         if name in spec.declaration.variances:
