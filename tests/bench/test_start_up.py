@@ -25,6 +25,47 @@ def loaded_by(code):
     return set(done.stdout.split())
 
 
+TELL = "import sys; sys.argv = ['gripbench', {arguments}]; " + (
+    "from gripbench.bench.command_line import main\ntry:\n    main()\nexcept SystemExit:\n    pass\n"
+    "print(); print(*sorted(sys.modules))"
+)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    ["--help", "--version", "list methods", "list scenarios", "list signals", "show slip_slope",
+     "show double_lane_change_snow", "show li2014"],
+)  # fmt: skip
+def test_what_there_is_is_told_without_the_libraries_that_run_it(arguments):
+    listed = ", ".join(map(repr, arguments.split()))
+    done = subprocess.run(
+        [sys.executable, "-c", TELL.format(arguments=listed)],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    *told, modules = done.stdout.rstrip().splitlines()
+    assert len(told) >= 1
+    slow = {*HEAVY, "numba", "gymnasium", "pandas", "scipy", "joblib", "pyarrow"}
+    assert slow.isdisjoint(modules.split())
+
+
+MAKE = "print(gymnasium.make('gripbench/ConstantMu-v0').spec.id)"
+
+
+@pytest.mark.parametrize("order", ["gripbench, gymnasium", "gymnasium, gripbench"])
+def test_environments_are_known_after_both_imports_in_any_order(order):
+    done = subprocess.run(
+        [sys.executable, "-c", f"import {order}; {MAKE}"],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.stdout.strip() == "gripbench/ConstantMu-v0", done.stderr
+
+
+def test_the_package_costs_no_library():
+    loaded = loaded_by("import gripbench")
+    assert loaded.isdisjoint({*HEAVY, "numba", "gymnasium", "pandas", "numpy", "typer"})
+
+
 def test_help_needs_no_numerics():
     assert loaded_by(START).isdisjoint({*HEAVY, "numba", "pandas", "scipy"})
 

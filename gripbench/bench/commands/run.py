@@ -33,10 +33,10 @@ def run(
     method: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="METHOD",
-            help=r"NAME[:VARIANT]\[@PARAMETER=NUMBER,...] or FILE.py:CLASS[:VARIANT]..., repeat for "
-            "more. With a suite they come on top of its methods; without a suite and methods, all "
-            "built-in ones run that fit.",
+            metavar="ONE",
+            help=r"NAME[:VARIANT]\[@PARAMETER=NUMBER,...] or FILE.py:CLASS with the same settings; "
+            "repeat for more. With a suite they come on top of its methods; without a suite and "
+            "methods, all built-in ones run that fit.",
         ),
     ] = None,
     level: Annotated[

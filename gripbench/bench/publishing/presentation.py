@@ -105,7 +105,8 @@ def rms_tables(summary: pd.DataFrame, width: int) -> list[tuple[str, Table]]:
             continue
         factor, unit = signal(target).display_factor, signal(target).display_unit
         runs = int(part["runs"].max())
-        heading = f"{target} [{unit}]: RMS error, pooled over {runs} runs, 95 % interval"
+        heading = f"{target} [{unit}]: RMS error"
+        heading += f", pooled over {runs} runs, 95 % interval" if runs > 1 else ", one run"
         responds = bool((part["excited"].fillna(0) > 0).any())
         table = _across(part, factor)
         if responds or Console(width=10_000).measure(table).maximum > width:
