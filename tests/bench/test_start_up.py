@@ -26,7 +26,8 @@ def loaded_by(code):
 
 
 TELL = "import sys; sys.argv = ['gripbench', {arguments}]; " + (
-    "from gripbench.bench.command_line import main\ntry:\n    main()\nexcept SystemExit:\n    pass\n"
+    "from gripbench.bench.command_line import main\n"
+    "try:\n    main()\nexcept SystemExit:\n    pass\n"
     "print(); print(*sorted(sys.modules))"
 )
 
