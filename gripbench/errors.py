@@ -55,6 +55,10 @@ class InputError(GripbenchError):
     """Bad input: says what was wrong, where, and what would be right."""
 
 
+class InterruptionError(GripbenchError):
+    """The user interrupted a command; says what is kept."""
+
+
 class UndeclaredChannelError(GripbenchError):
     """A method read a channel, or wrote an estimate, that it did not declare."""
 

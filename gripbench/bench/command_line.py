@@ -15,7 +15,7 @@ import typer
 from gripbench import __version__
 from gripbench.bench import commands
 from gripbench.compilation import declare_only
-from gripbench.errors import GripbenchError
+from gripbench.errors import GripbenchError, InterruptionError
 
 
 def application() -> typer.Typer:
@@ -53,12 +53,16 @@ def main() -> None:
         declare_only()
     try:
         code = application()(standalone_mode=False)
+        if code == _INTERRUPTED:  # some versions of typer return this instead of raising
+            raise KeyboardInterrupt
+        sys.stdout.flush()
+    except InterruptionError as error:
+        _stop(str(error), _INTERRUPTED)
     except GripbenchError as error:
         _stop(str(error), 2)
-    except (KeyboardInterrupt, typer.Abort) as error:
+    except (KeyboardInterrupt, typer.Abort):
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # one is enough: what follows is short
-        said = str(error.__cause__ or error)
-        _stop(said or "interrupted; what had finished is kept: run the same command again", 130)
+        _stop("interrupted; what had finished is kept: run the same command again", _INTERRUPTED)
     except BrokenPipeError:
         # whoever read the output has gone: no words can reach anybody
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
@@ -83,6 +87,10 @@ def _only_tells(arguments: list[str]) -> bool:
     return command == "list" or (
         command == "show" and not any(name.startswith(runs) for name in rest)
     )
+
+
+_INTERRUPTED = 130
+"""Exit code of an interrupted command, as shells give it."""
 
 
 def _stop(message: str, code: int) -> NoReturn:

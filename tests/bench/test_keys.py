@@ -91,7 +91,7 @@ def test_rows_of_two_versions_of_a_scenario_share_no_board(plan, tmp_path):
         plan.seeds,
     )
     run_plan(changed, Store(tmp_path), Backend(workers=1))
-    with pytest.raises(InputError, match="scenario 'short': it or the scoring changed between"):
+    with pytest.raises(InputError, match="rows of 'short' come from 2 versions of the scenario"):
         rank(read_rows(tmp_path), target="mu_front")
     run_plan(
         dataclasses.replace(changed, methods=plan.methods), Store(tmp_path), Backend(workers=1)

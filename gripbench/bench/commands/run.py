@@ -81,8 +81,9 @@ def run(
     from gripbench.bench.running.backends import Backend
     from gripbench.bench.running.recorded_scenarios import PREFIX
     from gripbench.bench.running.rows import Row, frame_of, untracked
-    from gripbench.bench.running.runner import run_plan
+    from gripbench.bench.running.runner import InterruptedRun, run_plan
     from gripbench.bench.running.store import Store
+    from gripbench.errors import InterruptionError
     from gripbench.writing import check_writable, write_atomically
 
     if export is not None:
@@ -98,14 +99,17 @@ def run(
             rows.append(row)
             bar.advance(task)
 
-        report = run_plan(
-            plan,
-            Store(results),
-            Backend(backend, workers, scheduler),
-            limits_of(time_limit, memory_limit),
-            fresh,
-            on_row,
-        )
+        try:
+            report = run_plan(
+                plan,
+                Store(results),
+                Backend(backend, workers, scheduler),
+                limits_of(time_limit, memory_limit),
+                fresh,
+                on_row,
+            )
+        except InterruptedRun as error:
+            raise InterruptionError(str(error)) from None
     frame = frame_of(sorted(rows, key=order_in(plan)))
     shown = frame[frame["target"].isin([*targets, ""])] if targets else frame
     print_summary(summary(shown))

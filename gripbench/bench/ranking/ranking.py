@@ -33,7 +33,6 @@ from gripbench.bench.ranking.pareto import pareto_front
 from gripbench.bench.ranking.plans import plan_of
 from gripbench.bench.ranking.resolution import resolution
 from gripbench.bench.ranking.skill import against_guess, best_baseline
-from gripbench.bench.ranking.versions import check_versions
 from gripbench.bench.running.recorded_scenarios import PREFIX
 from gripbench.bench.scoring.metric import Metric, pooled_rms
 from gripbench.bench.scoring.metrics import metrics
@@ -181,7 +180,6 @@ def boards(
     if not 0.5 <= confidence < 1.0:
         raise InputError(f"confidence is {confidence:g}; it must be from 0.5 to below 1")
     rows = _only(_only(rows, "scenario", scenarios), "label", labels)
-    check_versions(rows)
     targets = [target] if isinstance(target, str) else list(target)
     known = [str(name) for name in rows["target"].unique() if name]
     for name in targets:
