@@ -40,7 +40,7 @@ class Scenario(Configuration):
     integrator
         Named choice of the plant's integrator.
     sensor_suite
-        Name of the file with the sensors.
+        Name of the file with the sensors; empty: only those of `sensors`.
     sensors
         Sensors that differ from the suite's, or come on top.
     score_from
@@ -114,4 +114,5 @@ class Scenario(Configuration):
 
     def all_sensors(self) -> dict[str, Sensor]:
         """Return the sensors by channel: the suite's, then this scenario's own on top."""
-        return load_sensor_suite(self.sensor_suite) | dict(self.sensors)
+        suite = load_sensor_suite(self.sensor_suite) if self.sensor_suite else {}
+        return suite | dict(self.sensors)

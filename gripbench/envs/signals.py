@@ -19,7 +19,8 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from gripbench.errors import UndeclaredChannelError, nearest, unknown
+from gripbench.errors import InputError, UndeclaredChannelError, nearest, unknown
+from gripbench.extensions import entry_points, load
 
 VARIANCE = "_variance"
 """Suffix of the estimate that holds the variance of another estimate."""
@@ -292,7 +293,35 @@ def signal(name: str) -> Signal:
         return Signal(
             name, "-", "-", "1: new sample, 0: held", parent.instrument, f"{parent.name} is new"
         )
+    known = len(SIGNALS)
+    if len(all_signals()) > known:
+        return signal(name)
     raise unknown("signal", name, SIGNALS)
+
+
+def all_signals() -> dict[str, Signal]:
+    """Return the signal table with the signals of installed packages, group `gripbench.signals`.
+
+    Their entry points are looked for at each call, because the path may have grown since.
+
+    Raises
+    ------
+    InputError
+        If one cannot be loaded, is none, or has the name of another.
+    """
+    found: dict[str, Signal] = {}
+    for point in entry_points("gripbench.signals").values():
+        given = load(point, (Signal, tuple))
+        for entry in given if isinstance(given, tuple) else (given,):
+            if SIGNALS.get(entry.name) == entry:
+                continue  # added before
+            if entry.name in SIGNALS or entry.name in found:
+                raise InputError(
+                    f"entry point '{point.name}' of {point.group}: signal '{entry.name}' exists"
+                )
+            found[entry.name] = entry
+    SIGNALS.update(found)
+    return SIGNALS
 
 
 Angle = TypeVar("Angle", float, npt.NDArray[np.float64])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,7 @@ from gripbench.envs.recordings import Recording
 from gripbench.envs.scenarios import LEVELS, Scenario
 from gripbench.envs.vehicles import Vehicle, load_vehicle
 from gripbench.errors import InputError, nearest, unknown
+from gripbench.extensions import entry_points, load
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,24 @@ WORLDS: dict[str, World] = {
     "planar": World(PlanarScenario, PlanarSimulation, PlanarSimulation.truth_type),
     "bicycle": World(BicycleScenario, BicycleSimulation, BicycleSimulation.truth_type),
 }
-"""Every world, by the name that scenario files use."""
+"""Every world that ships, by the name that scenario files use."""
+
+
+@cache
+def known_worlds() -> dict[str, World]:
+    """Return every world by name: those that ship, and those of the group `gripbench.worlds`.
+
+    Raises
+    ------
+    InputError
+        If a package's world cannot be loaded, is none, or has the name of one that ships.
+    """
+    found = dict(WORLDS)
+    for name, point in entry_points("gripbench.worlds").items():
+        if name in found:
+            raise InputError(f"entry point '{name}' of {point.group}: there is a world '{name}'")
+        found[name] = load(point, World)
+    return found
 
 
 def scenario_files() -> dict[str, Path]:
@@ -78,13 +97,13 @@ def load_scenario(name: str) -> Scenario:
         path = files[name]
     content = read_toml(path)
     world = content.get("world")
-    if world not in WORLDS:
-        raise InputError(f"{path}: key 'world' is {world!r}: {nearest(str(world), WORLDS)}")
-    scenario = parse(WORLDS[world].scenario, content, path)
+    if world not in known_worlds():
+        raise InputError(f"{path}: key 'world' is {world!r}: {nearest(str(world), known_worlds())}")
+    scenario = parse(known_worlds()[world].scenario, content, path)
     if name.endswith(".toml"):
         sample_time = None if scenario.integrator == PAPER_SOLVER else scenario.sample_time
         try:
-            SensorSuite(scenario.all_sensors(), WORLDS[world].truth_type, sample_time, 0)
+            SensorSuite(scenario.all_sensors(), known_worlds()[world].truth_type, sample_time, 0)
         except InputError as error:
             raise InputError(f"{path}: {error}") from None
     return scenario
@@ -138,7 +157,9 @@ def simulation_of(scenario: Scenario, vehicle: Vehicle | None = None) -> Simulat
     """
     if scenario.level:
         return DrawnSimulation(scenario, vehicle)
-    return WORLDS[scenario.world].simulation(scenario, vehicle or load_vehicle(scenario.vehicle))
+    return known_worlds()[scenario.world].simulation(
+        scenario, vehicle or load_vehicle(scenario.vehicle)
+    )
 
 
 def sensors_of(scenario: Scenario, seed: int) -> dict[str, Sensor]:
@@ -160,7 +181,7 @@ class DrawnSimulation(Simulation):
     def __init__(self, scenario: Scenario, vehicle: Vehicle | None = None) -> None:
         self._scenario = scenario
         self._vehicle = vehicle
-        world = WORLDS[scenario.world]
+        world = known_worlds()[scenario.world]
         self.truth_type = world.truth_type  # type: ignore[misc]
         self._begin(0)
         self.actions = self._inner.actions  # type: ignore[misc]
@@ -204,7 +225,7 @@ class DrawnSimulation(Simulation):
 
     def _begin(self, seed: int) -> None:
         drawn = draw(self._scenario, seed, self._vehicle)
-        self._inner = WORLDS[self._scenario.world].simulation(drawn.scenario, drawn.road)
+        self._inner = known_worlds()[self._scenario.world].simulation(drawn.scenario, drawn.road)
 
 
 def record(
@@ -228,7 +249,7 @@ def record(
         Deviations from paper by cause that take the place of those drawn.
     """
     drawn = draw(scenario, seed, vehicle, changes)
-    simulation = WORLDS[scenario.world].simulation(drawn.scenario, drawn.road)
+    simulation = known_worlds()[scenario.world].simulation(drawn.scenario, drawn.road)
     truth = simulation.run(seed)
     suite = SensorSuite(drawn.sensors, simulation.truth_type, simulation.sample_time, seed)
     return Recording(

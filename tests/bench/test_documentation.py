@@ -19,6 +19,7 @@ PAGES = (
     "docs/add-a-scenario.md",
     "docs/add-a-vehicle.md",
     "docs/contract.md",
+    "docs/extend.md",
     "docs/figures.md",
     "docs/ranking.md",
     "docs/api.md",

@@ -13,7 +13,7 @@ from gripbench.envs.plants.driven import DrivenScenario
 from gripbench.envs.plants.planar.world import PlanarScenario
 from gripbench.envs.scenarios import Scenario
 from gripbench.envs.signals import NEW, signal
-from gripbench.envs.worlds import WORLDS, load_scenario
+from gripbench.envs.worlds import known_worlds, load_scenario
 from gripbench.errors import unknown
 
 NAMESPACE = "gripbench/"
@@ -54,7 +54,7 @@ def environment_lines() -> tuple[tuple[str, ...], Lines]:
 def action_lines() -> tuple[tuple[str, ...], Lines]:
     """Return header and lines of the table of the actions of each world."""
     lines: Lines = []
-    for world, parts in WORLDS.items():
+    for world, parts in known_worlds().items():
         actions = parts.simulation.actions  # type: ignore[attr-defined]
         for at, (action, scale) in enumerate(
             zip(actions, ActionMap.of(actions).scale, strict=True)

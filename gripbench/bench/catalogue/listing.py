@@ -27,7 +27,7 @@ from gripbench.envs.populations.population import (
     load_population,
     population_files,
 )
-from gripbench.envs.signals import SIGNALS, signal
+from gripbench.envs.signals import all_signals, signal
 from gripbench.envs.vehicles import VEHICLE_PARAMETERS, load_vehicle, vehicle_files
 from gripbench.errors import InputError, unknown
 from gripbench.methods.contract import CompiledMethod
@@ -66,14 +66,14 @@ def settings(name: str) -> dict[str, Any]:
         from gripbench.bench.catalogue.environments import environment_settings  # Gymnasium
 
         return {"kind": "environment", **environment_settings(name)}
-    if name in SIGNALS:
+    if name in all_signals():
         entry = signal(name)
         shown = {"angle": entry.angle, "display_unit": entry.display_unit}
         return {"kind": "signal", **vars(entry), **shown}
     if ".py" in name or name.partition(":")[0].partition("@")[0] in method_names():
         return {"kind": "method", **_method(name)}
     known = [
-        *all_scenario_files(), *method_names(), *suite_files(), *vehicle_files(), *SIGNALS,
+        *all_scenario_files(), *method_names(), *suite_files(), *vehicle_files(), *all_signals(),
         *population_files(), *grade_files(),
     ]  # fmt: skip
     raise unknown("name", name, known)
@@ -116,7 +116,7 @@ def sensor_needs(target: str = "", everything: bool = False) -> tuple[tuple[str,
         raise InputError(f"no method estimates '{target}'")
     instruments = [
         name
-        for name in dict.fromkeys(item.instrument for item in SIGNALS.values())
+        for name in dict.fromkeys(item.instrument for item in all_signals().values())
         if any(name in _instruments(method) for method in methods.values())
     ]
     names = [name + MARK if name == "idealised" else name for name in instruments]
@@ -222,7 +222,7 @@ def _vehicle_lines() -> tuple[tuple[str, ...], Lines]:
 def _signal_lines() -> tuple[tuple[str, ...], Lines]:
     return ("signal", "unit", "axes", "positive", "instrument", "description"), [
         (item.name, item.unit, item.frame, item.sign, item.instrument, item.description)
-        for item in SIGNALS.values()
+        for item in all_signals().values()
     ]
 
 

@@ -29,6 +29,7 @@ from gripbench.configuration import CONFIGS, Configuration, parse, read_toml
 from gripbench.envs.scenarios import LEVELS, Scenario
 from gripbench.envs.worlds import at_level, load_scenario, scenario_files, split_level
 from gripbench.errors import InputError, unknown
+from gripbench.extensions import entry_points, load
 from gripbench.methods.contract import CompiledMethod
 from gripbench.sources import digest, source_digest
 
@@ -72,11 +73,6 @@ def built_in_methods() -> Mapping[str, type[CompiledMethod]]:
             ):
                 found[item.name] = item
     return dict(sorted(found.items()))
-
-
-def entry_points(group: str) -> dict[str, importlib.metadata.EntryPoint]:
-    """Return the entry points of a group that installed packages declare, by name."""
-    return {point.name: point for point in importlib.metadata.entry_points(group=group)}
 
 
 def method_names() -> dict[str, str]:
@@ -386,7 +382,7 @@ def find_scenario(name: str) -> Scenario:
 
 def _plugged_scenarios() -> Iterator[tuple[str, Path]]:
     for name, point in entry_points(SCENARIO_GROUP).items():
-        given = point.load()
+        given = load(point)
         place = Path(given() if isinstance(given, Callable) else given)  # type: ignore[arg-type]
         if place.is_dir():
             yield from ((path.stem, path) for path in sorted(place.glob("*.toml")))

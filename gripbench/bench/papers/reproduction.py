@@ -2,7 +2,8 @@
 
 Every paper is a folder of this package whose module `reproduction` has `load()`, which reads and
 checks the paper's file, and `reproduce(progress)`, which returns a `Reproduction`: that is printed
-and written the same way for each.
+and written the same way for each. A package adds such a module through the group
+`gripbench.papers`.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from gripbench.bench.papers.claims import (
 from gripbench.bench.publishing.tables import Column, Table
 from gripbench.configuration import Configuration
 from gripbench.errors import unknown
+from gripbench.extensions import entry_points, load
 
 Progress = Callable[[int, int], None]
 """Called with the parts done and their number."""
@@ -76,9 +78,12 @@ def reproduction_of(paper: str) -> Runnable:
     InputError
         If there is no such paper.
     """
-    files = paper_files()
+    files, points = paper_files(), entry_points("gripbench.papers")
+    if paper in points and paper not in files:
+        plugged: Runnable = load(points[paper])
+        return plugged
     if paper not in files:
-        raise unknown("paper", paper, files)
+        raise unknown("paper", paper, (*files, *points))
     module: Runnable = importlib.import_module(f"gripbench.bench.papers.{paper}.reproduction")
     return module
 

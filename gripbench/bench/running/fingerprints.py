@@ -53,7 +53,7 @@ def scenario_digest(scenario: Scenario) -> str:
     if isinstance(scenario, recorded_scenarios.RecordedScenario):
         windows = inspect.getsource(recorded_scenarios)
         return digest(scenario.content, scenario.absent, windows, source_digest(_RECORDED))
-    world = worlds.WORLDS[scenario.world]
+    world = worlds.known_worlds()[scenario.world]
     classes: tuple[Any, ...] = (world.scenario, world.simulation)
     files = [Path(inspect.getfile(item)) for item in classes]
     content = {

@@ -214,12 +214,12 @@ def sensors_at(scenario: Scenario) -> dict[str, Sensor]:
 
 def graded_sensors(scenario: Scenario, population: Population) -> dict[str, Sensor]:
     """Return the instruments of a scenario's level, before a car's own errors come on top."""
-    from gripbench.envs.worlds import WORLDS
+    from gripbench.envs.worlds import known_worlds
 
     grade = load_grade(population.instruments.grade(scenario.level))
     if grade is None:
         return scenario.all_sensors()
-    names = WORLDS[scenario.world].truth_type.names or ()
+    names = known_worlds()[scenario.world].truth_type.names or ()
     return {
         channel: _disturbed(_in_world(sensor, channel, names), scenario.sensors.get(channel))
         for channel, sensor in grade.sensors.items()

@@ -8,13 +8,13 @@ or a tuple of metrics.
 from __future__ import annotations
 
 import importlib
-import importlib.metadata
 import pkgutil
 from functools import cache
 from typing import Any
 
 from gripbench.bench.scoring.metric import Metric
 from gripbench.errors import InputError
+from gripbench.extensions import entry_points, load
 
 GROUP = "gripbench.metrics"
 """Entry point group of metrics."""
@@ -36,19 +36,9 @@ def metrics() -> dict[str, Metric]:
     shipped.sort(key=lambda name: (_FIRST.index(name) if name in _FIRST else len(_FIRST), name))
     for name in shipped:
         _add(found, importlib.import_module(f"{__name__}.{name}").METRICS, name)
-    for entry in sorted(importlib.metadata.entry_points(group=GROUP), key=lambda e: e.name):
-        _add(found, _loaded(entry), f"entry point '{entry.name}' of {GROUP}")
+    for name, point in entry_points(GROUP).items():
+        _add(found, load(point), f"entry point '{name}' of {GROUP}")
     return found
-
-
-def _loaded(entry: importlib.metadata.EntryPoint) -> Any:
-    try:
-        return entry.load()
-    except Exception as error:
-        raise InputError(
-            f"entry point '{entry.name}' of {GROUP} ({entry.value}): "
-            f"{type(error).__name__}: {error}; repair or uninstall its package"
-        ) from None
 
 
 def _add(found: dict[str, Metric], given: Any, source: str) -> None:
