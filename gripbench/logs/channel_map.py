@@ -37,13 +37,19 @@ from gripbench.envs.vehicles import VEHICLE_PARAMETERS, load_vehicle
 from gripbench.errors import GripbenchError, InputError, unknown
 from gripbench.logs.map_tables import (
     DATETIME,
+    Attitude,
     Bound,
+    Brake,
     Column,
     Databases,
     Delimiter,
     Derived,
+    Drive,
+    Geodetic,
+    Level,
     LogFile,
     Name,
+    Sensor,
     TimeColumn,
     convertible,
 )
@@ -69,6 +75,17 @@ class ChannelMap(Configuration):
         Those of the only file, see `LogFile`.
     files
         The files by a short name, where the recording has several.
+    axes
+        Axes of the log: ISO 8855 (x forward, y left, z up) or SAE J670 (x forward, y right, z
+        down), which turns the sign of every signal that does not lie along x.
+    sensors
+        Where sensors sit and how they are turned, by a name that columns give as `sensor`.
+    level
+        Angles whose component of gravity is taken off the accelerometers.
+    brake, drive
+        Torques by axle from brake pressure, engine and gear.
+    geodetic, attitude
+        Position from latitude and longitude, yaw from a quaternion.
     rows
         Channel whose samples make the rows; empty: the samples of all, merged.
     runs
@@ -105,10 +122,17 @@ class ChannelMap(Configuration):
     decimal: Literal[".", ","] = "."
     header: int = Field(default=0, ge=0)
     files: dict[str, LogFile] = Field(default_factory=dict)
+    axes: Literal["ISO", "SAE"] = "ISO"
+    sensors: dict[str, Sensor] = Field(default_factory=dict)
+    level: Level = Level()
+    brake: dict[Literal["front", "rear"], Brake] = Field(default_factory=dict)
+    drive: Drive | None = None
+    geodetic: Geodetic | None = None
+    attitude: Attitude | None = None
     rows: str = ""
     runs: Name = ""
     training_runs: tuple[int, ...] = ()
-    channels: dict[str, Column] = Field(min_length=1)
+    channels: dict[str, Column] = Field(default_factory=dict)
     reference: dict[str, Column] = Field(default_factory=dict)
     derived: Derived = Derived()
     bounds: dict[str, tuple[Bound, ...]] = Field(default_factory=dict)
@@ -150,9 +174,14 @@ class ChannelMap(Configuration):
     @model_validator(mode="after")
     def _check_names(self) -> Self:
         both = [f"channels.{name}" for name in self.channels]
+        placed = self.geodetic is not None and self.geodetic.to == "channels"
+        if not (self.channels or self.brake or self.drive or placed):
+            raise ValueError("channels: none is mapped; a table [channels.SIGNAL] names a column")
         for key, column in [*self._columns()]:
             if column.file and column.file not in self.files:
                 raise ValueError(f"{key}.file: {unknown('file', column.file, self.files)}")
+            if column.sensor and column.sensor not in self.sensors:
+                raise ValueError(f"{key}.sensor: {unknown('sensor', column.sensor, self.sensors)}")
             if self.files and not column.file and len(self.files) > 1:
                 raise ValueError(f"{key}: say which of the files ({', '.join(self.files)}) has it")
         if self.rows and self.rows not in self.channels:
@@ -170,6 +199,22 @@ class ChannelMap(Configuration):
             *((f"channels.{name}", column) for name, column in self.channels.items()),
             *((f"reference.{name}", column) for name, column in self.reference.items()),
         ]
+
+    def source_columns(self) -> dict[str, Column]:
+        """Return the columns of `brake`, `drive`, `geodetic` and `attitude` by their keys."""
+        found = {f"brake.{axle}.pressure": brake.pressure for axle, brake in self.brake.items()}
+        for name in ("drive", "geodetic"):
+            table = getattr(self, name)
+            for part in ("engine", "gear", "latitude", "longitude", "height"):
+                column = getattr(table, part, None)
+                if column is not None:
+                    found[f"{name}.{part}"] = column
+        if self.attitude is not None:
+            for index, column_name in enumerate(self.attitude.quaternion):
+                found[f"attitude.quaternion[{index}]"] = Column(
+                    column=column_name, unit="-", file=self.attitude.file
+                )
+        return found
 
     def keyed_columns(self) -> dict[str, Column]:
         """Return every mapped column by its key in the file, such as `channels.yaw_rate`."""

@@ -31,9 +31,21 @@ def derive_reference(reference: dict[str, Series], derived: Derived) -> dict[str
     if derived.velocity_window > 0.0:
         _velocity(found, derived.velocity_window)
     if derived.reference_ahead != 0.0:
+        if "speed_y" not in found and "sideslip" in found and "speed_x" in found:
+            slip, ahead = _together(found, ("sideslip", "speed_x"), "derived.reference_ahead")
+            values = ahead.values * np.tan(slip.values)
+            found["speed_y"] = replace(slip, name="speed_y", key="derived speed_y", values=values)
         left, turning = _together(found, ("speed_y", "yaw_rate"), "derived.reference_ahead")
         moved = left.values - derived.reference_ahead * turning.values
         found["speed_y"] = replace(left, values=moved)
+        if "sideslip" in found:
+            slip, ahead, turn = _together(
+                found, ("sideslip", "speed_x", "yaw_rate"), "derived.reference_ahead"
+            )
+            sideways = ahead.values * np.tan(slip.values) - derived.reference_ahead * turn.values
+            moving = np.abs(ahead.values) >= derived.sideslip_above
+            at = np.where(moving, np.arctan2(sideways, ahead.values), slip.values)
+            found["sideslip"] = replace(slip, values=at)
     if derived.acceleration_window > 0.0:
         _acceleration(found, derived.acceleration_window)
     if "speed_x" in found and "speed_y" in found and "sideslip" not in found:

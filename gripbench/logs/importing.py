@@ -24,11 +24,15 @@ from gripbench.envs.vehicles import CarOnPaper
 from gripbench.errors import InputError
 from gripbench.logs.channel_map import ChannelMap, LogFile, load_channel_map, vehicle_values
 from gripbench.logs.derivation import derive_channels, derive_reference
+from gripbench.logs.geometry import SAE_TURNED, levelled, placed
 from gripbench.logs.initial import zeroed
+from gripbench.logs.laws import speed_of
 from gripbench.logs.log import Log, LogColumn, log_of_frame
+from gripbench.logs.map_tables import Column
 from gripbench.logs.quality import QualityReport, judge
 from gripbench.logs.readers import read_log
 from gripbench.logs.series import Floats, Series, series_of, wrapped
+from gripbench.logs.sources import add_sources
 
 _MAXIMUM_GAP = 3.0  # reference samples further apart than this many median intervals leave a hole
 _GPS = ("course", "speed_gps", "velocity_north", "velocity_west")
@@ -127,7 +131,8 @@ def import_frame(frame: pd.DataFrame, channel_map: ChannelMap | Mapping[str, Any
 
 def _wanted(channel_map: ChannelMap, short: str, file: LogFile) -> set[str]:
     names = {file.time.column, file.time.date, channel_map.runs}
-    for column in channel_map.keyed_columns().values():
+    columns = {**channel_map.keyed_columns(), **channel_map.source_columns()}
+    for column in columns.values():
         if channel_map.file_of(column) == short:
             names |= {column.column, column.time, column.new_when, column.new_where}
             names |= {column.negative_where, column.valid_where}
@@ -196,18 +201,30 @@ def _recording(
     logs: dict[str, Log], channel_map: ChannelMap, vehicle: dict[str, float], run: int
 ) -> tuple[Recording, QualityReport]:
     files = channel_map.log_files()
-    series: dict[str, Series] = {}
-    for key, column in channel_map.keyed_columns().items():
+
+    def read(name: str, key: str, column: Column, target: str = "") -> Series:
         short = channel_map.file_of(column)
-        name = key.partition(".")[2]
-        series[key] = series_of(logs[short], name, key, column, files[short].time, vehicle)
+        time = files[short].time
+        found = series_of(logs[short], name, key, column, time, vehicle, target)
+        if channel_map.axes == "SAE" and not target and name in SAE_TURNED:
+            found = replace(found, values=-found.values)
+        return found
+
+    series = {
+        key: read(key.partition(".")[2], key, column)
+        for key, column in channel_map.keyed_columns().items()
+    }
     channels = {s.name: s for key, s in series.items() if key.startswith("channels.")}
     reference = {
         s.name: replace(s, times=s.times - s.column.delay)
         for key, s in series.items()
         if key.startswith("reference.")
     }
+    add_sources(channel_map, read, channels, reference)
+    channels = _with_ratios(channels, reference, vehicle)
     channels, zeros = zeroed(channels)
+    channels, reference = placed(channels, reference, channel_map.sensors)
+    channels = levelled(channels, reference, channel_map.level)
     channels = derive_channels(channels, channel_map.derived)
     reference = derive_reference(reference, channel_map.derived)
     for name in channel_map.derived.instruments:
@@ -247,6 +264,27 @@ def _recording(
         ),
     )
     return recording, report
+
+
+def _with_ratios(
+    channels: dict[str, Series], reference: dict[str, Series], vehicle: dict[str, float]
+) -> dict[str, Series]:
+    """Return the channels divided by what their ratio is at the speed of the moment."""
+    found = dict(channels)
+    for name, series in channels.items():
+        if not series.column.ratio_over_speed:
+            continue
+        speed = speed_of(channels, reference, vehicle)
+        if speed is None:
+            raise InputError(
+                f"channel map: key '{series.key}.ratio_over_speed': no speed is mapped"
+            )
+        now = np.interp(series.times, speed.times, np.abs(speed.values))
+        at, ratio = zip(*series.column.ratio_over_speed, strict=True)
+        if min(abs(one) for one in ratio) == 0.0:
+            raise InputError(f"channel map: key '{series.key}.ratio_over_speed': a ratio is 0")
+        found[name] = replace(series, values=series.values / np.interp(now, at, ratio))
+    return found
 
 
 def _rows(

@@ -37,14 +37,6 @@ WHEELS = (
     "wheel_speed_rear_left", "wheel_speed_rear_right",
 )  # fmt: skip
 _FIELD = ("magnetic_field_x", "magnetic_field_y", "magnetic_field_z")
-_LIMITS = {
-    "sideslip": 1.0, "yaw_rate": 3.5, "roll_rate": 3.0, "pitch_rate": 3.0, "accel_x": 16.0,
-    "accel_y": 20.0, "speed_x": 120.0, "speed_gps": 120.0, "speed_y": 25.0, "steer_angle": 0.9,
-    "roll": 0.7, "pitch": 0.7, "velocity_north": 120.0, "velocity_west": 120.0,
-    "road_bank": 0.7, "road_grade": 0.7, **dict.fromkeys(WHEELS, 500.0),
-}  # fmt: skip
-_MODEL_CAR = ("yaw_rate", "roll_rate", "pitch_rate", "accel_x", "accel_y", "sideslip")
-_MODEL_CAR_FACTOR = 4.0
 
 
 @dataclass(frozen=True)
@@ -113,7 +105,6 @@ def laws_of(
 ) -> Iterator[Law]:
     """Yield every law that the log excites enough."""
     speed = speed_of(channels, reference, vehicle)
-    yield from _limits(channels, reference, vehicle, speed)
     if speed is not None:
         yield from _speed_laws(channels, reference, vehicle, speed)
     yield from _turning_laws(channels, reference)
@@ -323,42 +314,6 @@ def _attitude_laws(channels: dict[str, Series], reference: dict[str, Series]) ->
                 lambda step, w, a, k=gradient: (w, k * np.gradient(a, step)),
                 _ROUGH,
             )
-
-
-def _limits(
-    channels: dict[str, Series],
-    reference: dict[str, Series],
-    vehicle: dict[str, float],
-    speed: Series | None,
-) -> Iterator[Law]:
-    """Yield what no vehicle does."""
-    wheelbase = vehicle.get("cg_to_front", 0.0) + vehicle.get("cg_to_rear", 0.0)
-    model = 0.0 < wheelbase < 1.0
-    for source in (channels, reference):
-        for name, highest in _LIMITS.items():
-            series = source.get(name)
-            if series is None or "derived" in series.key:
-                continue
-            values = np.abs(series.values)
-            if name == "sideslip" and speed is not None:  # at rest it means nothing
-                moving = np.interp(series.times, speed.times, np.abs(speed.values)) > _MOVING
-                values = values[moving]
-            if not len(values):
-                continue
-            if model and name in _MODEL_CAR:
-                highest *= _MODEL_CAR_FACTOR
-            reached = float(np.percentile(values, 98.0))
-            text = (
-                f"reaches {reached:.4g} {_unit_of(name)}, more than the {highest:g} "
-                "that a vehicle does"
-            )
-            yield Law(text, {series.key: 1}, reached / highest, limit=True)
-
-
-def _unit_of(name: str) -> str:
-    from gripbench.envs.signals import signal
-
-    return signal(name).unit
 
 
 def _field_laws(channels: dict[str, Series]) -> Iterator[Law]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
@@ -114,6 +115,17 @@ class Column(Configuration):
     radius
         What the column is divided by [m] where `per` names the wheel's radius and the map no
         vehicle that has it.
+    table
+        Pairs of the column's value and the value that it means in `unit`, the first rising: a
+        steering gear's curve. Between them it is linear, beyond them the value is missing.
+    ratio_over_speed
+        Pairs of a speed [m/s], rising, and what the column is divided by at it.
+    pulses
+        Pulses a revolution, by which a count or a frequency of pulses is divided.
+    rollover
+        Where a counter starts at 0 again, such as 65536; it is made to run on.
+    sensor
+        Which of the map's `sensors` measured it.
     negative_where
         Column that is not 0 where the value is negative, of a log that keeps magnitude and sign.
     valid_where
@@ -147,6 +159,11 @@ class Column(Configuration):
     offset: float = 0.0
     per: str = ""
     radius: float = Field(default=0.0, ge=0.0)
+    table: tuple[tuple[float, float], ...] = ()
+    ratio_over_speed: tuple[tuple[float, float], ...] = ()
+    pulses: int = Field(default=0, ge=0)
+    rollover: float = Field(default=0.0, ge=0.0)
+    sensor: str = ""
     negative_where: Name = ""
     valid_where: Name = ""
     rate: float = Field(default=0.0, ge=0.0)
@@ -158,12 +175,127 @@ class Column(Configuration):
     shift: float = Field(default=0.0, ge=-1e4, le=1e4)
     zero: Literal["", "standstill", "straight"] = ""
 
+    @field_validator("table", "ratio_over_speed")
+    @classmethod
+    def _check_rising(
+        cls, value: tuple[tuple[float, float], ...]
+    ) -> tuple[tuple[float, float], ...]:
+        if value and (len(value) < 2 or any(a[0] >= b[0] for a, b in itertools.pairwise(value))):
+            raise ValueError("two or more pairs, the first of each above that of the pair before")
+        return value
+
     @field_validator("per")
     @classmethod
     def _check_per(cls, value: str) -> str:
         if value and value not in VEHICLE_PARAMETERS:
             raise ValueError(str(unknown("vehicle parameter", value, VEHICLE_PARAMETERS)))
         return value
+
+
+class Sensor(Configuration):
+    """Where a sensor sits and how it is turned.
+
+    Attributes
+    ----------
+    position
+        Before, left of and above the centre of gravity [m].
+    rotation
+        Roll, pitch and yaw [deg] of its axes against the vehicle's.
+    """
+
+    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    rotation: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+class Level(Configuration):
+    """Angles whose component of gravity is taken off the accelerometers.
+
+    Attributes
+    ----------
+    roll, pitch
+        Mapped signals that tell how the body, with it its accelerometers, rolls and pitches:
+        `roll` and `pitch`, bank and grade included, or `suspension_roll`, or `road_bank`.
+    """
+
+    roll: Literal["", "roll", "suspension_roll", "road_bank"] = ""
+    pitch: Literal["", "pitch", "road_grade"] = ""
+
+
+class Brake(Configuration):
+    """A brake torque that follows from a pressure.
+
+    Attributes
+    ----------
+    pressure
+        Column of the pressure, in a unit of pressure.
+    torque_per_bar
+        Torque on the axle for each bar [N m].
+    """
+
+    pressure: Column
+    torque_per_bar: float = Field(gt=0.0)
+
+
+class Drive(Configuration):
+    """A drive torque that follows from engine and gear.
+
+    Attributes
+    ----------
+    axle
+        The axle that is driven.
+    engine
+        Column of the engine's torque.
+    gear, ratios
+        Column of the gear, and the gearbox's ratio of each gear by its number (0 for an open
+        clutch, negative in reverse); without them the torque is behind the gearbox.
+    final_drive, efficiency
+        Ratio and efficiency behind the gearbox.
+    """
+
+    axle: Literal["front", "rear"]
+    engine: Column
+    gear: Column | None = None
+    ratios: dict[str, float] = Field(default_factory=dict)
+    final_drive: float = Field(default=1.0, gt=0.0)
+    efficiency: float = Field(default=1.0, gt=0.0, le=1.0)
+
+
+class Geodetic(Configuration):
+    """Position from latitude and longitude, north and west of an origin.
+
+    Attributes
+    ----------
+    latitude, longitude, height
+        Columns; without a height it is that of the ellipsoid.
+    origin
+        Latitude and longitude [deg] and height [m] of the origin; by default the first sample.
+    to
+        Whether the position is for methods or to judge by.
+    """
+
+    latitude: Column
+    longitude: Column
+    height: Column | None = None
+    origin: tuple[float, float, float] | None = None
+    to: Literal["channels", "reference"] = "reference"
+
+
+class Attitude(Configuration):
+    """Yaw, pitch and roll of the reference from a quaternion.
+
+    Attributes
+    ----------
+    quaternion
+        Columns of x, y, z and w: from the vehicle's axes to those of the earth, z up.
+    counts_from
+        Where the earth's x axis points.
+    file
+        Which of the map's `files` has them.
+    """
+
+    quaternion: tuple[Name, Name, Name, Name]
+    counts_from: Literal["north", "east"] = "north"
+    file: Name = ""
 
 
 class Bound(Configuration):
@@ -212,6 +344,8 @@ class Derived(Configuration):
     gps_velocity
         Whether the channels `velocity_north` and `velocity_west` follow from `speed_gps` and
         `course`.
+    course_from_velocity
+        Whether the channel `course` follows from `velocity_north` and `velocity_west`.
     instruments
         Channels that a method may read although they come from the reference: motion capture in
         the place of a speed sensor.
@@ -222,6 +356,7 @@ class Derived(Configuration):
     sideslip_above: float = Field(default=1.0, gt=0.0)
     reference_ahead: float = Field(default=0.0, ge=-10.0, le=10.0)
     gps_velocity: bool = False
+    course_from_velocity: bool = False
     instruments: tuple[str, ...] = ()
 
 

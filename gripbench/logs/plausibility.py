@@ -16,6 +16,7 @@ import numpy as np
 
 from gripbench.logs.alignment import Lag, lags, shifted
 from gripbench.logs.laws import Law, laws_of, speed_of
+from gripbench.logs.limits import limits_of
 from gripbench.logs.series import Series
 from gripbench.logs.units import UNITS
 
@@ -113,7 +114,10 @@ def _misfit_of_units(
     channels: dict[str, Series], reference: dict[str, Series], vehicle: dict[str, float]
 ) -> tuple[list[Misfit], dict[str, float]]:
     """Return what the laws find, and the change of each series that mends it."""
-    laws = list(laws_of(channels, reference, vehicle))
+    laws = [
+        *limits_of(channels, reference, vehicle),
+        *laws_of(channels, reference, vehicle),
+    ]
     broken = [law for law in laws if not law.holds({})]
     if not broken:
         return [], {}
@@ -150,7 +154,11 @@ def _mended(
     broken: Sequence[Law],
 ) -> bool:
     """Whether no law is broken once the mend is made, of those that it could touch or others."""
-    again = laws_of(_scaled(channels, mend), _scaled(reference, mend), vehicle)
+    new_channels, new_reference = _scaled(channels, mend), _scaled(reference, mend)
+    again = [
+        *limits_of(new_channels, new_reference, vehicle),
+        *laws_of(new_channels, new_reference, vehicle),
+    ]
     return all(law.holds({}) or law.text.startswith("speed * sideslip") for law in again)
 
 

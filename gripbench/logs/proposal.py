@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import dataclass, field
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -48,7 +49,7 @@ class Draft:
     tables: dict[str, Entry]
     instruments: list[str] = field(default_factory=list)
     unknown: list[str] = field(default_factory=list)
-    axes: str = ""
+    extra: dict[str, dict[str, Any]] = field(default_factory=dict)
 
     def content(self) -> dict[str, Any]:
         """Return the map as a dictionary."""
@@ -61,6 +62,7 @@ class Draft:
         for key, entry in self.tables.items():
             table_name, _, name = key.partition(".")
             whole.setdefault(table_name, {})[name] = entry.keys
+        whole |= self.extra
         if self.instruments:
             whole["derived"] = {"instruments": self.instruments}
         return whole
@@ -98,6 +100,7 @@ def draft(path: Path, logs: dict[str, Log], databases: tuple[str, ...]) -> Draft
     for short, log in logs.items():
         _add_columns(made, short, log)
     _settle_speed(made)
+    _add_poses(made, logs)
     return made
 
 
@@ -120,6 +123,9 @@ def text_of(made: Draft) -> str:
         lines += ["", f"[{key}]"]
         lines += [f"# GUESS: {reason}" for reason in entry.reasons]
         lines += [f"{name} = {_toml(value)}" for name, value in entry.keys.items()]
+    for key, keys in made.extra.items():
+        lines += ["", f"[{key}]"]
+        lines += [f"{name} = {_toml(value)}" for name, value in keys.items()]
     if made.instruments:
         lines += ["", "[derived]", "# GUESS: the reference's speed serves as a sensor, too"]
         lines.append(f"instruments = {_toml(made.instruments)}")
@@ -132,6 +138,8 @@ def text_of(made: Draft) -> str:
 def _toml(value: Any) -> str:
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {_toml(one)}" for key, one in value.items()) + " }"
     if isinstance(value, (list, tuple)):
         return "[" + ", ".join(_toml(one) for one in value) + "]"
     return repr(value)
@@ -249,6 +257,36 @@ def _mend_by_physics(made: Draft, logs: dict[str, Log]) -> None:
             made.tables[key].keys |= keys
             said = ", ".join(f"{name} = {_toml(value)}" for name, value in keys.items())
             made.tables[key].reasons.append(f"{said}: so says the physics of the other channels")
+
+
+def _add_poses(made: Draft, logs: dict[str, Log]) -> None:
+    """Map positions and quaternions, which no single column's name tells."""
+    for short, log in logs.items():
+        file = {"file": short} if short else {}
+        names = {
+            re.sub(r"[^a-z]", "", name.lower().rpartition(".")[2]): name for name in log.columns
+        }
+        latitude = names.get("lat", names.get("latitude"))
+        longitude = names.get("lon", names.get("long", names.get("longitude", names.get("lng"))))
+        usable = find_spec("pymap3d") is not None
+        if usable and latitude and longitude and "geodetic" not in made.extra:
+            made.extra["geodetic"] = {
+                "latitude": {"column": latitude, "unit": "deg", **file},
+                "longitude": {"column": longitude, "unit": "deg", **file},
+            }
+            made.unknown = [name for name in made.unknown if name not in (latitude, longitude)]
+        parts = [names.get(one) for one in ("qx", "qy", "qz", "qw")]
+        if all(parts) and "attitude" not in made.extra:
+            made.extra["attitude"] = {"quaternion": parts, "counts_from": "north", **file}
+            for name, target in (("tx", "position_x"), ("ty", "position_y")):
+                if name in names and f"channels.{target}" not in made.tables:
+                    entry = Entry(
+                        {"column": names[name], "unit": "m", **file},
+                        ["the frame of the pose is taken for north and west"],
+                    )
+                    made.tables[f"channels.{target}"] = entry
+            known = {*parts, names.get("tx"), names.get("ty")}
+            made.unknown = [name for name in made.unknown if name not in known]
 
 
 def _settle_speed(made: Draft) -> None:

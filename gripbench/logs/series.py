@@ -57,7 +57,13 @@ class Series:
 
 
 def series_of(
-    log: Log, name: str, key: str, column: Column, time: TimeColumn, vehicle: dict[str, float]
+    log: Log,
+    name: str,
+    key: str,
+    column: Column,
+    time: TimeColumn,
+    vehicle: dict[str, float],
+    target: str = "",
 ) -> Series:
     """Return one mapped column of a log.
 
@@ -71,6 +77,8 @@ def series_of(
         The file's time column.
     vehicle
         Vehicle parameters, of which `column.per` names one.
+    target
+        Unit that the values come out in; empty: the signal's.
 
     Raises
     ------
@@ -87,6 +95,12 @@ def series_of(
             "name this channel's own time column"
         )
     values = _signed_and_valid(log, key, column, values)
+    if column.table:
+        low, high = column.table[0][0], column.table[-1][0]
+        beyond = (values - column.offset < low) | (values - column.offset > high)
+        values = np.where(beyond, np.nan, values)
+    if column.rollover > 0.0:
+        values = _run_on(values, column.rollover)
     finite = np.isfinite(values) & np.isfinite(times)
     infinite = int(np.isinf(values).sum())
     missing = len(values) - int(finite.sum()) - infinite
@@ -104,7 +118,7 @@ def series_of(
         name=name,
         key=key,
         times=times + (time.shift + column.shift),
-        values=_convert(log.path, name, key, values, column, vehicle),
+        values=_convert(log.path, name, key, values, column, vehicle, target),
         column=column,
         log_unit=raw.unit,
         repeated=repeated,
@@ -132,6 +146,16 @@ def _signed_and_valid(log: Log, key: str, column: Column, values: Floats) -> Flo
         else:
             values = np.where(marks != 0.0, values, np.nan)
     return values
+
+
+def _run_on(counts: Floats, rollover: float) -> Floats:
+    """Return a counter that does not start at 0 again."""
+    found = counts.copy()
+    filled = np.flatnonzero(np.isfinite(counts))
+    steps = np.diff(counts[filled])
+    steps -= rollover * np.round(steps / rollover)
+    found[filled[1:]] = counts[filled[0]] + np.cumsum(steps)
+    return found
 
 
 def _forward(
@@ -201,10 +225,20 @@ def _change_rate(
 
 
 def _convert(
-    path: Path, name: str, key: str, values: Floats, column: Column, vehicle: dict[str, float]
+    path: Path,
+    name: str,
+    key: str,
+    values: Floats,
+    column: Column,
+    vehicle: dict[str, float],
+    target: str,
 ) -> Floats:
     per_unit = VEHICLE_PARAMETERS[column.per].unit if column.per else ""
-    factor = column.sign * column.scale * conversion(column.unit, signal(name).unit, per_unit)
+    try:
+        unit = conversion(column.unit, target or signal(name).unit, per_unit)
+    except InputError as error:
+        raise InputError(f"channel map: key '{key}.unit': {error}") from None
+    factor = column.sign * column.scale * unit / (column.pulses or 1)
     if column.per == "wheel_radius" and column.per not in vehicle and column.radius > 0.0:
         factor /= column.radius
     elif column.per:
@@ -214,8 +248,12 @@ def _convert(
                 "name a vehicle that does"
             )
         factor /= vehicle[column.per]
-    converted = factor * (values - column.offset)
-    return wrapped(converted) if name == "course" else converted
+    counted = values - column.offset
+    if column.table:
+        given, meant = zip(*column.table, strict=True)
+        counted = np.interp(counted, given, meant)
+    converted = factor * counted
+    return wrapped(converted) if name == "course" and not target else converted
 
 
 def wrapped(angle: Floats) -> Floats:
