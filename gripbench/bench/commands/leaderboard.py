@@ -73,7 +73,7 @@ def leaderboard(
         format_of(report)
         check_writable(report)
     suites = [load_suite(name) for name in suite or ()]
-    names = [find_scenario(item).name for each in suites for item in each.scenarios]
+    names = [find_scenario(item).name for each in suites for item in each.names()]
     rows = read_rows(results, tuple(names) if suite else ())
     if rows.empty:
         raise InputError(f"{results}: no stored rows to rank; 'gripbench run' makes them")

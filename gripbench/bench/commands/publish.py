@@ -34,6 +34,13 @@ def publish(
     with_papers: Annotated[
         bool, typer.Option("--papers/--no-papers", help="Whether to reproduce papers.")
     ] = True,
+    timings: Annotated[
+        Path | None,
+        typer.Option(
+            help="JSON of pytest-benchmark: the leaderboard then carries runtimes relative to the "
+            "reference kernel, which CI compares with."
+        ),
+    ] = None,
     workers: Annotated[int, typer.Option(min=0, help="Processes; 0: one a core.")] = 0,
 ) -> None:
     """Run the suites, reproduce the papers; write tables, figures, leaderboard, report, manifest.
@@ -48,6 +55,7 @@ def publish(
     from gripbench.bench.publishing.manifest import manifest, write_manifest
     from gripbench.bench.publishing.report.content import chosen_targets, rows_of_suites
     from gripbench.bench.publishing.report.page import write_report
+    from gripbench.bench.publishing.timings import read_timings
     from gripbench.bench.ranking.statistics import CONFIDENCE
     from gripbench.bench.running.api import limits_of, plan_of
     from gripbench.bench.running.backends import Backend
@@ -60,6 +68,7 @@ def publish(
     for name in papers:
         if name not in paper_files():
             raise unknown("paper", name, paper_files())
+    runtimes = read_timings(timings) if timings else None
     backend = Backend(workers=workers)
     began = time.perf_counter()
 
@@ -79,8 +88,8 @@ def publish(
     rows = rows_of_suites(read_rows(results), suites)
     rows = rows[rows["seed"] < seeds]
     targets = chosen_targets(rows, suites)
-    write(results, *build(rows, None, CONFIDENCE, targets))
-    say("leaderboard")
+    write(results, *build(rows, runtimes, CONFIDENCE, targets))
+    say("leaderboard" if runtimes else "leaderboard, without runtimes: give --timings")
     configuration = {name: load_suite(name).model_dump(mode="json") for name in suites}
     write_manifest(results, manifest(configuration, dict.fromkeys(suites, seeds)))
     write_report(results, results / "report.html", suites, workers=backend.processes)

@@ -24,6 +24,12 @@ def report(
         list[str] | None,
         typer.Option(help="Only this target; repeat for more. By default those of the suites."),
     ] = None,
+    method: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Your own method, FILE.py:Class, so that it has curves; repeat for more."
+        ),
+    ] = None,
     seeds: Annotated[int, typer.Option(min=1, help="Seeds whose time series can be seen.")] = 3,
     band: Annotated[int, typer.Option(min=1, help="Seeds over which error bands are taken.")] = 20,
     workers: Annotated[int, typer.Option(min=0, help="Processes; 0: one a core.")] = 0,
@@ -54,5 +60,6 @@ def report(
             band,
             Backend(workers=workers).processes,
             advance,
+            tuple(method or ()),
         )
     typer.echo(f"Written: {path} ({path.stat().st_size / 1e6:.1f} MB)")

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from gripbench.bench.publishing.tables import Column, Table
@@ -36,29 +38,33 @@ def board_table(board: Board, timings: Timings | None = None, wide: bool = False
         nine columns.
     """
     columns = _wide(board, timings is not None) if wide else _narrow(board)
-    rows = [_row(line, board.target, timings or {}) for line in board.lines.to_dict("records")]
+    rows = [
+        _row(line, board.target, timings or {}, _decimals(board))
+        for line in board.lines.to_dict("records")
+    ]
     return Table(columns, tuple(rows), caption=board.title, notes=_notes(board, wide))
 
 
 def _narrow(board: Board) -> tuple[Column, ...]:
     """Return the columns that a person needs: at most nine."""
     unit = signal(board.target).display_unit.replace("-", "")
+    format_ = _decimals(board)
     columns = [
         Column("place", "Rank"),
         Column("name", "Method"),
         *((Column("initials", "Reads"),) if not board.sensors else ()),
         Column("score", "Score", format=".3g", best="lowest", tied="tied"),
-        Column("rms", "RMS", unit, ".3g"),
+        Column("rms", "RMS", unit, format_),
         Column("rmses_short", f"{100.0 * board.confidence:g} %"),
         *(
             (
                 Column("skill", "Skill", format=".2f"),
-                Column("beats_guess", "> guess", "%", ".0f"),
+                Column("percent_guess", "> guess"),
             )
             if board.guess
             else ()
         ),
-        Column("beats_next", "> next", "%", ".0f"),
+        Column("percent_next", "> next"),
     ]
     return tuple(columns)
 
@@ -246,7 +252,7 @@ def shown_in(metric: Metric, target: str) -> tuple[float, str]:
     return (shown.display_factor, shown.display_unit) if own else (1.0, metric.unit)
 
 
-def _row(line: Mapping[Any, Any], target: str, timings: Timings) -> dict[str, Any]:
+def _row(line: Mapping[Any, Any], target: str, timings: Timings, format_: str) -> dict[str, Any]:
     runtime = timings.get(line["label"], {}).get("batch")
     factor = signal(target).display_factor
     return {
@@ -258,7 +264,9 @@ def _row(line: Mapping[Any, Any], target: str, timings: Timings) -> dict[str, An
         "beats_guess": _times(line["beats_guess"], 100.0),
         "beats_next": _times(line["beats_next"], 100.0),
         "elsewhere": _range(line["elsewhere_from"], line["elsewhere_to"], ".3f"),
-        "rmses_short": _range(factor * line["rms_from"], factor * line["rms_to"], ".3g"),
+        "rmses_short": _range(factor * line["rms_from"], factor * line["rms_to"], format_),
+        "percent_guess": _percent(line["beats_guess"]),
+        "percent_next": _percent(line["beats_next"]),
         "ranks": _range(line["rank_from"], line["rank_to"], "d"),
         "scores": _range(line["score_from"], line["score_to"], ".3f"),
         "rms": _times(line["rms"], factor),
@@ -295,6 +303,18 @@ def _name(line: Mapping[Any, Any]) -> str:
     marks = (GUESS if line["baseline"] else "") + (NOT_BETTER if line["verdict"] else "")
     name = marked(line["label"], line["idealised"])
     return f"{name} {marks}" if marks else name
+
+
+def _decimals(board: Board) -> str:
+    """Return the format in which the smallest RMS of a board has three digits."""
+    values = signal(board.target).display_factor * board.lines["rms"].to_numpy(float)
+    values = values[np.isfinite(values) & (values > 0.0)]
+    least = math.log10(values.min()) if len(values) else 0.0
+    return f".{min(max(0, 2 - math.floor(least)), 6)}f"
+
+
+def _percent(share: float) -> str | None:
+    return None if pd.isna(share) else f"{100.0 * share:.0f} %"
 
 
 def _place(line: Mapping[Any, Any]) -> str:

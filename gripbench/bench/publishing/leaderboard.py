@@ -87,15 +87,11 @@ class Leaderboard(Configuration):
 
     def answers_found(self) -> list[Answer]:
         """Return the answers as they were made."""
-        return [
-            Answer(
-                **{
-                    key: math.nan if value is None else value
-                    for key, value in {**one, "sensors": tuple(one["sensors"])}.items()
-                }
-            )
-            for one in self.answers
-        ]
+        found = []
+        for one in self.answers:
+            known: Any = {key: math.nan if value is None else value for key, value in one.items()}
+            found.append(Answer(**{**known, "sensors": tuple(one["sensors"])}))
+        return found
 
 
 def usual_targets(rows: pd.DataFrame) -> list[str]:

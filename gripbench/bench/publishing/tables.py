@@ -312,7 +312,7 @@ def html(table: Table) -> str:
     for column in table.columns:
         name = "number" if _is_numeric(table, column) else "text"
         heading = html_format.escape(column.heading)
-        lines.append(f'<th scope="col" class="{name}">{heading}</th>')
+        lines.append(f'<th scope="col" class="{name}" data-key="{column.key}">{heading}</th>')
     lines.append("</tr></thead>")
     for group in table.groups or (range(0),):
         lines.append("<tbody>")
@@ -426,10 +426,10 @@ def _markdown(text: str) -> str:
 def _html_cell(table: Table, row: int, column: Column, best: bool) -> str:
     value = table.rows[row][column.key]
     text = html_format.escape(table.text(row, column))
-    attributes = ""
+    attributes = f' data-key="{html_format.escape(column.key)}"'
     if _is_numeric(table, column):
         names = "number best" if best else "number"
-        attributes = f' class="{names}"'
+        attributes += f' class="{names}"'
     if _is_number(value):
         attributes += f' data-value="{float(value)!r}"'
     return f"<td{attributes}>{f'<strong>{text}</strong>' if best else text}</td>"

@@ -91,7 +91,7 @@ def sensor_sets(rows: pd.DataFrame) -> list[tuple[str, ...]]:
     """
     readers: dict[tuple[str, ...], set[str]] = {}
     for (channels, label), part in rows.groupby(["sensors", "label"]):
-        own = readers.setdefault(instruments(channels), set())
+        own = readers.setdefault(instruments(str(channels)), set())
         if not part["baseline"].any():
             own.add(str(label))
     sets = sorted(readers, key=lambda names: (len(names), names))

@@ -22,7 +22,7 @@ NO_BETTER = "no better than a guess"
 def best_baseline(lines: pd.DataFrame) -> str:
     """Return the label of the baseline with the lowest score, empty where there is none."""
     ranked = lines[lines["baseline"].astype(bool) & lines["score"].notna()]
-    return str(ranked.loc[ranked["score"].idxmin(), "label"]) if len(ranked) else ""
+    return str(ranked.sort_values("score", kind="stable")["label"].iloc[0]) if len(ranked) else ""
 
 
 def against_guess(
@@ -60,12 +60,13 @@ def against_guess(
     if not guess:
         return lines
     place = order.index(guess)
-    by_guess = float(lines.loc[place, "score"])
+    scores = lines["score"].to_numpy(float)
+    by_guess = scores[place]
     pooled = _pooled(grid)
     for i, label in enumerate(order):
         if i != place:
             lines.loc[i, "beats_guess"] = wins[i, place] / number
-        score = float(lines.loc[i, "score"])
+        score = scores[i]
         if math.isnan(score):
             continue
         lines.loc[i, "skill"] = 1.0 - score / by_guess
@@ -82,4 +83,4 @@ def _pooled(grid: Grid) -> pd.DataFrame:
     """Return the pooled RMS by scenario and method, of the methods that finished every run."""
     good = grid.rows[grid.rows["label"].isin(grid.labels)]
     sums = good.groupby(["scenario", "label"])[["sum_of_squares", "count"]].sum()
-    return np.sqrt(sums["sum_of_squares"] / sums["count"]).unstack("label")
+    return pd.DataFrame((sums["sum_of_squares"] / sums["count"]).pow(0.5).unstack("label"))

@@ -19,6 +19,8 @@ from gripbench.bench.publishing.board_tables import board_table
 from gripbench.bench.publishing.figures.style import axis_scale
 from gripbench.bench.publishing.presentation import significant
 from gripbench.bench.publishing.tables import Column, Table
+from gripbench.bench.ranking.answers import words
+from gripbench.bench.ranking.plans import road_of
 from gripbench.bench.ranking.ranking import Board, boards
 from gripbench.bench.ranking.summary import failures, marked, summary
 from gripbench.envs.signals import signal
@@ -70,7 +72,7 @@ def chosen_targets(rows: pd.DataFrame, suites: Sequence[str] = ()) -> tuple[str,
     wanted: dict[str, None] = {}
     for name in suites or suite_files():
         suite = load_suite(name)
-        if suites or scenarios & set(suite.scenarios):
+        if suites or scenarios & set(suite.names()):
             wanted.update(dict.fromkeys(suite.targets))
     targets = [name for name in wanted if name in present]
     if targets:
@@ -94,7 +96,7 @@ def rows_of_suites(rows: pd.DataFrame, suites: Sequence[str]) -> pd.DataFrame:
     for name in suites:
         suite = load_suite(name)
         labels = {spec.label for spec in suite.specs()}
-        part = rows["scenario"].isin(suite.scenarios) & rows["label"].isin(labels)
+        part = rows["scenario"].isin(suite.names()) & rows["label"].isin(labels)
         if not part.any():
             raise InputError(
                 f"no stored row of suite '{name}': gripbench run --suite {name} makes them"
@@ -144,6 +146,7 @@ def heat_map(rows: pd.DataFrame, target: str) -> dict[str, Any]:
             text[-1].append(shown)
     return {
         "scenarios": scenarios,
+        "roads": [road_of(name) for name in scenarios],
         "methods": [marked(label, names[label]) for label in labels],
         "ratio": ratio,
         "text": text,
@@ -188,15 +191,17 @@ def failure_table(rows: pd.DataFrame) -> Table:
     return Table.from_frame(failures(rows), columns)
 
 
-def shown_board(board: Board) -> Table:
-    """Return a board as the report shows it."""
-    return board_table(board, wide=True)
+def shown_board(board: Board) -> tuple[str, Table, Table]:
+    """Return a board as the report shows it: in words, what a person needs, everything."""
+    return words(board), board_table(board), board_table(board, wide=True)
 
 
 def target_words(target: str) -> dict[str, Any]:
-    """Return what the page says of a target: description, unit of plots."""
+    """Return what the page says of a target: description, unit of plots, a whole turn in it."""
     unit = axis_scale(target)[1]
-    return {"description": signal(target).description, "unit": "" if unit == "-" else unit}
+    item = signal(target)
+    turn = 2.0 * math.pi * item.display_factor if item.angle else 0.0
+    return {"description": item.description, "unit": "" if unit == "-" else unit, "turn": turn}
 
 
 def paper_results(results: Path) -> list[PaperResult]:

@@ -13,7 +13,9 @@ from typing import Any
 import pandas as pd
 
 import gripbench
+from gripbench.bench.catalogue.registry import choose_method
 from gripbench.bench.publishing import tables
+from gripbench.bench.publishing.board_tables import answer_table
 from gripbench.bench.publishing.figures.style import SERIES
 from gripbench.bench.publishing.manifest import commit
 from gripbench.bench.publishing.report.content import (
@@ -31,6 +33,8 @@ from gripbench.bench.publishing.report.content import (
     today,
 )
 from gripbench.bench.publishing.report.series import POINTS, SeriesPlan, all_series
+from gripbench.bench.ranking.answers import answers
+from gripbench.bench.ranking.plans import plan_of
 from gripbench.bench.running.recorded_scenarios import at_hand
 from gripbench.bench.running.store import read_rows
 from gripbench.errors import InputError
@@ -50,6 +54,7 @@ def write_report(
     band_seeds: int = 20,
     workers: int = 1,
     advance: Callable[[int, int], None] = lambda done, total: None,
+    methods: Sequence[str] = (),
 ) -> Path:
     """Write the report of what is stored in a results folder.
 
@@ -71,6 +76,8 @@ def write_report(
         Number of processes that make time series.
     advance
         Called with scenarios done and their number.
+    methods
+        Methods from files of one's own, `file.py:Class` as they were run, so that they have curves.
 
     Raises
     ------
@@ -85,7 +92,8 @@ def write_report(
         )
     rows = rows_of_suites(rows, suites)
     chosen = tuple(targets) or chosen_targets(rows, suites)
-    plans = series_plans(rows, chosen, shown_seeds, band_seeds)
+    own = {choose_method(method).label: method for method in methods}
+    plans = series_plans(rows, chosen, shown_seeds, band_seeds, own)
     done = 0
 
     def count() -> None:
@@ -99,7 +107,11 @@ def write_report(
 
 
 def series_plans(
-    rows: pd.DataFrame, targets: Sequence[str], shown: int, band: int
+    rows: pd.DataFrame,
+    targets: Sequence[str],
+    shown: int,
+    band: int,
+    own: Mapping[str, str] | None = None,
 ) -> list[SeriesPlan]:
     """Return what to draw of each scenario: methods that ran there, on seeds that were run.
 
@@ -116,7 +128,7 @@ def series_plans(
             for target in targets
             if (part["target"] == target).any()
         }
-        plans.append(SeriesPlan(str(scenario), estimates, seeds[:shown], seeds[:band]))
+        plans.append(SeriesPlan(str(scenario), estimates, seeds[:shown], seeds[:band], own or {}))
     return plans
 
 
@@ -156,6 +168,7 @@ def page(
     }
     parts = {
         "css": _file("report.css"),
+        "answers": _answers(rows, targets),
         "summary": _summary(rows, targets),
         "boards": "\n".join(_board(board) for board in found),
         "papers": _papers(paper_results(results)),
@@ -215,10 +228,25 @@ def _summary(rows: pd.DataFrame, targets: Sequence[str]) -> str:
 
 def _board(board: Any) -> str:
     sensors = ", ".join(board.sensors) or "any"
+    plan = plan_of(board.scenarios[0]) if board.scenarios else ""
+    choice = f"{sensors} ({plan})" if plan else sensors
+    said, narrow, wide = shown_board(board)
+    title = html.escape(board.title)
     return (
-        f'<div class="board scroll" tabindex="0" role="region" '
-        f'aria-label="{html.escape(board.title)}" data-target="{html.escape(board.target)}" '
-        f'data-sensors="{html.escape(sensors)}">\n{tables.html(shown_board(board))}</div>'
+        f'<div class="board" data-target="{html.escape(board.target)}" '
+        f'data-sensors="{html.escape(choice)}">\n<p class="answer">{html.escape(said)}</p>\n'
+        f'<div class="narrow scroll" tabindex="0" role="region" aria-label="{title}">\n'
+        f"{tables.html(narrow)}</div>\n<details><summary>Every column</summary>"
+        f'<div class="scroll" tabindex="0" role="region" aria-label="{title}, every column">\n'
+        f"{tables.html(wide)}</div></details></div>"
+    )
+
+
+def _answers(rows: pd.DataFrame, targets: Sequence[str]) -> str:
+    found = tables.html(answer_table(answers(rows, targets)))
+    return (
+        '<div class="scroll" tabindex="0" role="region" '
+        f'aria-label="Which method for which road and sensors">\n{found}</div>'
     )
 
 

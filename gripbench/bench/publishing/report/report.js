@@ -94,6 +94,20 @@
     byId("board-text").addEventListener("input", showBoard);
     chooseTarget();
   }
+  // Answers: the road and the sensors that one has.
+  const answers = [...document.querySelectorAll("#answers tbody tr")];
+  if (answers.length) {
+    const cells = (name) => answers.map((row) => row.querySelector(`[data-key="${name}"]`).textContent.trim());
+    const one = (name, every) => { fill(byId(`answer-${name}`), [every, ...new Set(cells(name))]); };
+    one("target", "every target"); one("road", "every road"); one("sensors", "any sensors");
+    const filter = () => {
+      const wanted = ["target", "road", "sensors"].map((name) => [cells(name), byId(`answer-${name}`)]);
+      answers.forEach((row, i) => {
+        row.hidden = !wanted.every(([texts, select]) => select.selectedIndex === 0 || texts[i] === select.value);
+      });
+    };
+    for (const name of ["target", "road", "sensors"]) byId(`answer-${name}`).addEventListener("change", filter);
+  }
   for (const form of document.querySelectorAll("form")) {
     form.addEventListener("submit", (event) => event.preventDefault());
   }
@@ -128,7 +142,8 @@
     paper_bgcolor: colour("--background"),
     plot_bgcolor: colour("--background"),
     font: { color: colour("--text"), family: getComputedStyle(document.body).fontFamily, size: 13 },
-    margin: { l: 70, r: 15, t: 10, b: 50 },
+    margin: { l: 70, r: 45, t: 10, b: 50 },
+    modebar: { orientation: "v", bgcolor: "rgba(0,0,0,0)", color: colour("--muted") }, // beside plot and legend
     hoverlabel: { bgcolor: colour("--surface"), font: { color: colour("--text") } },
     ...more,
   });
@@ -148,7 +163,12 @@
 
   const drawMap = () => {
     const target = byId("map-target").value;
-    const map = data.maps[target];
+    const whole = data.maps[target];
+    fill(byId("map-road"), ["every road", ...new Set(whole.roads)]);
+    const road = byId("map-road").value;
+    const kept = whole.scenarios.map((_, j) => j).filter((j) => road === "every road" || whole.roads[j] === road);
+    const of = (rows) => rows.map((row) => kept.map((j) => row[j]));
+    const map = { methods: whole.methods, scenarios: kept.map((j) => whole.scenarios[j]), ratio: of(whole.ratio), text: of(whole.text) };
     const top = 30; // ratios beyond this are all equally bad
     const z = map.ratio.map((row) => row.map((value) =>
       value === null ? null : Math.log10(Math.min(Math.max(value, 1), top))));
@@ -207,7 +227,8 @@
     const content = seriesOf();
     const target = byId("series-target").value;
     const seed = byId("series-seed").value;
-    const { unit } = data.targets[target];
+    const { unit, turn } = data.targets[target];
+    const difference = (value, true_) => (turn ? value - true_ - turn * Math.round((value - true_) / turn) : value - true_);
     const time = unpack(content.time);
     const truth = unpack(content.truth[target][seed]);
     byId("series-band").textContent = content.band_seeds;
@@ -226,7 +247,7 @@
           { x: time, y: high, yaxis: "y2", mode: "lines", line: { width: 0 }, fill: "tonexty",
             fillcolor: color + "33", showlegend: false, hoverinfo: "skip", legendgroup: label });
       }
-      traces.push({ x: time, y: values.map((value, k) => value === null || truth[k] === null ? null : value - truth[k]),
+      traces.push({ x: time, y: values.map((value, k) => value === null || truth[k] === null ? null : difference(value, truth[k])),
         yaxis: "y2", name: label, mode: "lines", line, showlegend: false, legendgroup: label });
     }
     const from = byId("series-from").valueAsNumber;
@@ -238,7 +259,7 @@
       yaxis: axis(title(target), { domain: [0.44, 1] }),
       yaxis2: axis(title("error"), { domain: [0, 0.38] }),
       legend: { orientation: "h", y: 1.02, yanchor: "bottom" },
-      margin: { l: 70, r: 15, t: 70, b: 50 },
+      margin: { l: 70, r: 45, t: 70, b: 50 },
       hovermode: "x unified", dragmode: "zoom",
       uirevision: [byId("series-scenario").value, target].join(),
     }));
@@ -249,7 +270,7 @@
     const points = data.fronts[target];
     const best = points.filter((point) => point.front).sort((a, b) => a.step - b.step);
     const narrow = byId("front-plot").clientWidth < 640;
-    byId("front-plot").style.height = narrow ? `${22 + 1.3 * points.length}rem` : "";
+    byId("front-plot").style.height = `${narrow ? 22 + 1.3 * points.length : 28 + 0.5 * points.length}rem`;
     const traces = [{
       x: best.map((point) => point.step), y: best.map((point) => point.score), mode: "lines",
       line: { color: colour("--muted"), dash: "dot", shape: "hv" }, name: "Pareto front", hoverinfo: "skip",
@@ -265,7 +286,7 @@
     react("front-plot", traces, layout({
       xaxis: axis("Time of a step [ns]", { type: "log", ...ticks(points.map((point) => point.step)) }),
       yaxis: axis("Score (1 is typical)", { type: "log", ...ticks(points.map((point) => point.score)) }),
-      legend: narrow ? { orientation: "h", y: -0.2, yanchor: "top", entrywidth: 1, entrywidthmode: "fraction" } : {},
+      legend: { orientation: "h", y: -0.2, yanchor: "top", ...(narrow ? { entrywidth: 1, entrywidthmode: "fraction" } : {}) },
     }));
   };
 
@@ -275,6 +296,7 @@
     fill(byId("map-target"), Object.keys(data.maps), targetWords);
     drawers.set("map-plot", drawMap);
     byId("map-target").addEventListener("change", drawMap);
+    byId("map-road").addEventListener("change", drawMap);
   }
   if (Object.keys(data.series).length) {
     fill(byId("series-scenario"), Object.keys(data.series), (name) => name.replaceAll("_", " "));

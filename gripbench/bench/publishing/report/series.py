@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import joblib
@@ -14,6 +14,7 @@ import numpy.typing as npt
 from gripbench.bench.catalogue.registry import find_scenario
 from gripbench.bench.publishing.figures.runs import Runs
 from gripbench.bench.publishing.figures.style import axis_scale
+from gripbench.bench.scoring.scoring import on_branch
 from gripbench.errors import GripbenchError
 
 Floats = npt.NDArray[np.float64]
@@ -41,12 +42,15 @@ class SeriesPlan:
         Seeds of which the page holds the curves.
     band
         Seeds over which error bands are taken.
+    own
+        What to choose for the labels of methods from files.
     """
 
     scenario: str
     estimates: Mapping[str, tuple[str, ...]]
     shown: tuple[int, ...]
     band: tuple[int, ...]
+    own: Mapping[str, str] = field(default_factory=dict)
 
 
 def packed(values: Floats) -> dict[str, Any]:
@@ -125,7 +129,7 @@ def series_of(plan: SeriesPlan) -> dict[str, Any]:
                 truth.setdefault(target, {})[str(seed)] = packed(true)
             for label in labels:
                 try:
-                    made = runs.estimates(plan.scenario, label, seed)[target]
+                    made = runs.estimates(plan.scenario, plan.own.get(label, label), seed)[target]
                 except GripbenchError:
                     continue  # it failed, as another section says, or its file is not at hand
                 value = scale * at_times(recording["time"], made, times)
@@ -133,7 +137,8 @@ def series_of(plan: SeriesPlan) -> dict[str, Any]:
                     of_label = estimates.setdefault(target, {}).setdefault(label, {})
                     of_label[str(seed)] = packed(value)
                 if seed in plan.band:
-                    errors.setdefault((target, label), []).append(value - true)
+                    branch = on_branch(target, value / scale, true / scale)
+                    errors.setdefault((target, label), []).append(scale * branch - true)
         runs.forget()
     bands: dict[str, dict[str, list[Any]]] = {}
     for (target, label), found in errors.items():
