@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails
 
-from gripbench.errors import InputError, nearest
+from gripbench.errors import InputError, nearest, unknown
 
 CONFIGS = Path(__file__).parent / "configs"
 """Where the TOML files that ship with gripbench lie."""
@@ -34,17 +34,21 @@ def read_toml(path: Path) -> dict[str, Any]:
     InputError
         If the file is missing, unreadable, empty or not TOML.
     """
+    if path.exists() and not path.is_file():
+        raise InputError(f"{path}: is no plain file")  # reading from a pipe would wait for ever
     try:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
         raise InputError(f"{path}: no such file") from None
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, ValueError) as error:  # no text, or a path that no file can have
         raise InputError(f"{path}: cannot be read as text ({error})") from None
     if not text.strip():
         raise InputError(f"{path}: the file is empty")
     try:
         return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except RecursionError:
+        raise InputError(f"{path}: not valid TOML: nested too deeply") from None
+    except ValueError as error:  # also a number of thousands of digits
         raise InputError(f"{path}: not valid TOML: {error}") from None
 
 
@@ -73,6 +77,32 @@ def parse(model: type[Model], content: Mapping[str, Any], source: str | Path) ->
         # a misspelt key is also a missing one; the misspelling is what helps
         misspelt = [detail for detail in details if detail["type"] == "extra_forbidden"]
         raise InputError(f"{source}: {_describe(model, [*misspelt, *details][0])}") from None
+    except (RecursionError, ValueError) as error:  # what JSON cannot hold
+        raise InputError(f"{source}: {error}") from None
+
+
+def named_file(kind: str, name: object, files: Mapping[str, Path]) -> Path:
+    """Return the file of a name, or of the path of a TOML file.
+
+    Parameters
+    ----------
+    kind
+        What it is, for the message.
+    name
+        One of `files`, or a path that ends with `.toml`.
+    files
+        The files by name.
+
+    Raises
+    ------
+    InputError
+        If it is neither; the message names the nearest one.
+    """
+    if isinstance(name, str) and name.endswith(".toml"):
+        return Path(name)
+    if not isinstance(name, str) or name not in files:
+        raise unknown(kind, str(name), files)
+    return files[name]
 
 
 def _describe(model: type[BaseModel], detail: ErrorDetails) -> str:

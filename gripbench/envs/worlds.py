@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gripbench.configuration import CONFIGS, parse, read_toml
+from gripbench.configuration import CONFIGS, named_file, parse, read_toml
 from gripbench.envs.instruments.sensors import Sensor, SensorSuite
 from gripbench.envs.plants.bicycle import BicycleScenario, BicycleSimulation
 from gripbench.envs.plants.longitudinal.world import (
@@ -30,7 +30,7 @@ from gripbench.envs.populations.population import (
 from gripbench.envs.recordings import Recording
 from gripbench.envs.scenarios import LEVELS, Scenario
 from gripbench.envs.vehicles import Vehicle, load_vehicle
-from gripbench.errors import InputError, nearest, unknown
+from gripbench.errors import InputError, nearest, one_line
 from gripbench.extensions import entry_points, load
 
 
@@ -88,18 +88,14 @@ def load_scenario(name: str) -> Scenario:
     place, level = split_level(name)
     if level or place != name:
         return at_level(load_scenario(place), level)
-    if name.endswith(".toml"):
-        path = Path(name)
-    else:
-        files = scenario_files()
-        if name not in files:
-            raise unknown("scenario", name, files)
-        path = files[name]
+    path = named_file("scenario", name, scenario_files())
     content = read_toml(path)
     world = content.get("world")
-    if world not in known_worlds():
-        raise InputError(f"{path}: key 'world' is {world!r}: {nearest(str(world), known_worlds())}")
-    scenario = parse(known_worlds()[world].scenario, content, path)
+    worlds = known_worlds()
+    if not isinstance(world, str) or world not in worlds:
+        hint = nearest(str(world), worlds)
+        raise InputError(f"{path}: key 'world' is {one_line(repr(world), 80)}: {hint}")
+    scenario = parse(worlds[world].scenario, content, path)
     if name.endswith(".toml"):
         sample_time = None if scenario.integrator == PAPER_SOLVER else scenario.sample_time
         try:

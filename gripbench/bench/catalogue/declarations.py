@@ -18,6 +18,7 @@ from typing import Any, Literal
 from gripbench.envs.signals import SIGNALS, VARIANCE, signal
 from gripbench.errors import LONGEST, GripbenchError, InputError, nearest, one_line, unknown
 from gripbench.methods.contract import CompiledMethod
+from gripbench.methods.settings import Variant
 
 
 @dataclass(frozen=True)
@@ -96,18 +97,48 @@ def make(factory: Any, variant: str, parameters: Mapping[str, Any], name: str) -
         if arguments or variant:
             raise InputError(f"{name}: an instance takes no variant or parameters any more")
         return factory
-    if variant:
-        arguments["variant"] = variant
     try:
         known = inspect.signature(factory).parameters
     except (TypeError, ValueError):
         known = inspect.signature(lambda **_: None).parameters
     flexible = any(item.kind is item.VAR_KEYWORD for item in known.values())
-    for key in arguments:
+    if variant and ("variant" in known or flexible):
+        arguments["variant"] = variant
+    elif variant:
+        arguments = {**_settings_of(factory, variant, name), **arguments}
+    for key, value in arguments.items():
         if key not in known and not flexible:
-            kind = "variant" if key == "variant" else f"parameter '{key}'"
-            raise InputError(f"{name}: it takes no {kind}: {nearest(key, known) or 'none'}")
+            raise InputError(f"{name}: it takes no parameter '{key}': {nearest(key, known)}")
+        if key in known:
+            arguments[key] = _as_default(value, known[key].default)
     return factory(**arguments)
+
+
+def _settings_of(factory: Any, variant: str, name: str) -> Mapping[str, Any]:
+    """Return the arguments of a variant that a plain class lists in `variants`."""
+    variants = getattr(factory, "variants", None)
+    if not isinstance(variants, Mapping) or not variants:
+        raise InputError(f"{name}: it takes no variant")
+    if variant not in variants:
+        raise unknown(f"variant of {name}", variant, variants)
+    found = variants[variant]
+    settings = found.settings if isinstance(found, Variant) else found
+    if not isinstance(settings, Mapping):
+        raise InputError(f"{name}: variant '{variant}' must be a table of parameter values")
+    return settings
+
+
+def _as_default(value: Any, default: Any) -> Any:
+    """Return a number in the type of a parameter's default: whole, real, or yes and no."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return value
+    if isinstance(default, bool):
+        return bool(value) if value in (0, 1) else value
+    if isinstance(default, float):
+        return float(value)
+    if isinstance(default, int) and float(value).is_integer():
+        return int(value)
+    return value
 
 
 def declaration_of(

@@ -14,6 +14,7 @@ import importlib
 import importlib.metadata
 import inspect
 import pkgutil
+import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -25,12 +26,13 @@ from pydantic import Field
 
 from gripbench import methods as built_in
 from gripbench.bench.catalogue.declarations import Declaration, Source, declaration_of
-from gripbench.configuration import CONFIGS, Configuration, parse, read_toml
+from gripbench.configuration import CONFIGS, Configuration, named_file, parse, read_toml
 from gripbench.envs.scenarios import LEVELS, Scenario
 from gripbench.envs.worlds import at_level, load_scenario, scenario_files, split_level
 from gripbench.errors import InputError, unknown
 from gripbench.extensions import entry_points, load
 from gripbench.methods.contract import CompiledMethod
+from gripbench.methods.settings import Setting
 from gripbench.sources import digest, source_digest
 
 METHOD_GROUP = "gripbench.methods"
@@ -181,22 +183,43 @@ def split_choice(text: str) -> tuple[str, str, dict[str, Any]]:
     >>> split_choice("slip_slope:paper@forgetting=0.99")
     ('slip_slope', 'paper', {'forgetting': 0.99})
     """
-    place, _, settings = text.partition("@")
+    place, at, settings = text.partition("@")
     head, dot, tail = place.rpartition(".py")
     name, *variant = tail.split(":")
     if dot:
+        if name:
+            raise InputError(f"method '{text}': '{name}' after '.py': {_FORM}")
         class_name = variant.pop(0) if variant else ""
         name = f"{head}.py:{class_name}" if class_name else f"{head}.py"
     if len(variant) > 1:
-        raise InputError(f"method '{text}': more than one variant")
+        raise InputError(f"method '{text}': more than one variant: {_FORM}")
+    for part in (*variant, name.rpartition(".py")[2].lstrip(":") if dot else name):
+        if part and not re.fullmatch(r"[\w.]+", part):
+            raise InputError(f"method '{text}': '{part}' is no name: {_FORM}")
     parameters: dict[str, Any] = {}
-    for item in filter(None, settings.split(",")):
-        key, _, value = item.partition("=")
-        try:
-            parameters[key.strip()] = float(value)
-        except ValueError:
-            raise InputError(f"method '{text}': '{item}' must be parameter=number") from None
+    for item in settings.split(",") if at else ():
+        key, equals, value = (part.strip() for part in item.partition("="))
+        if not (key.isidentifier() and equals and value):
+            raise InputError(f"method '{text}': '{item}' must be parameter=value: {_FORM}")
+        if key in parameters:
+            raise InputError(f"method '{text}': parameter '{key}' is given twice")
+        parameters[key] = _value(value)
     return name, variant[0] if variant else "", parameters
+
+
+_FORM = "give NAME[:VARIANT][@PARAMETER=VALUE,...] or FILE.py:CLASS[:VARIANT][@PARAMETER=VALUE,...]"
+
+
+def _value(text: str) -> Setting:
+    """Return a parameter's value: a whole number as such, a number, a yes or no, or a choice."""
+    if text.lower() in ("true", "false"):
+        return text.lower() == "true"
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text
 
 
 def choose_method(
@@ -345,10 +368,7 @@ def load_suite(name: str) -> Suite:
     InputError
         If there is no such suite or its file has a mistake.
     """
-    files = suite_files()
-    if not name.endswith(".toml") and name not in files:
-        raise unknown("suite", name, files)
-    path = Path(name) if name.endswith(".toml") else files[name]
+    path = named_file("suite", name, suite_files())
     return parse(Suite, read_toml(path), path)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from gripbench.bench.catalogue.registry import built_in_methods
 from gripbench.errors import InputError
 from gripbench.writing import write_atomically
 
@@ -105,6 +106,8 @@ def write_method(name: str, folder: Path, compiled: bool) -> tuple[Path, Path]:
     """
     if not re.fullmatch(r"[a-z][a-z0-9_]*", name):
         raise InputError(f"name '{name}': use lower case letters, digits and underscores")
+    if name in built_in_methods():
+        raise InputError(f"name '{name}': a built-in method has it; choose another")
     method, test = folder / f"{name}.py", folder / f"test_{name}.py"
     for path in (method, test):
         if path.exists():

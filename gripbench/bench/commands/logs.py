@@ -248,9 +248,9 @@ def _table(scores: list[RecordedScore]) -> Table:
 
 
 def _print_inspection(log: Path, database: Sequence[str]) -> None:
-    from rich.console import Console
     from rich.table import Table
 
+    from gripbench.bench.publishing.presentation import console
     from gripbench.logs.inspection import inspect_log
 
     inspection = inspect_log(log, database)
@@ -264,7 +264,7 @@ def _print_inspection(log: Path, database: Sequence[str]) -> None:
             column.low,
             column.high,
         )
-    Console(stderr=True).print(table)
+    console(stderr=True).print(table)
     for note in inspection.notes:
         print(f"note: {note}", file=sys.stderr)
     print(inspection.proposal, end="")

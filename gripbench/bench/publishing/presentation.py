@@ -4,29 +4,49 @@ from __future__ import annotations
 
 import math
 import sys
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
+from rich.text import Text
 
 from gripbench.bench.ranking.summary import FOOTNOTE, failures, marked
 from gripbench.envs.signals import signal
+from gripbench.errors import one_line
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
-def console() -> Console:
-    """Return the console for tables; wide where no terminal sets a width."""
-    return Console(width=None if sys.stdout.isatty() else 200, highlight=False)
+class _LiteralConsole(Console):
+    """A console on which a text is its letters: no markup, no emoji, no control characters."""
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        """Return a text, whatever it holds, on one line."""
+        return super().render_str(one_line(text), **options)
+
+
+def console(stderr: bool = False) -> Console:
+    """Return the console for texts and tables; wide where no terminal sets a width.
+
+    Names, reasons and notes come from outside: here alone they become letters on a line.
+    """
+    stream = sys.stderr if stderr else sys.stdout
+    return _LiteralConsole(
+        stderr=stderr,
+        width=None if stream.isatty() else 200,
+        highlight=False,
+        markup=False,
+        emoji=False,
+    )
 
 
 def progress(description: str, total: int) -> Progress:
     """Return a progress bar on standard error, silent where that is no terminal."""
     bar = Progress(
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
         TimeRemainingColumn(),
@@ -147,7 +167,7 @@ def _down(part: pd.DataFrame, factor: float, responds: bool) -> Table:
         if not shown:
             continue
         table.add_section()
-        table.add_row(f"[bold]{scenario}[/bold]")
+        table.add_row(Text(one_line(str(scenario)), "bold"))
         for line in shown:
             name = marked(line["label"], line["idealised"])
             more = _response(line, factor) if responds else ()
@@ -182,7 +202,7 @@ def _jumps(part: pd.DataFrame) -> Table:
     table.add_column("settled", justify="right")
     for scenario, lines in part[part["jumps"].fillna(0) > 0].groupby("scenario", sort=False):
         table.add_section()
-        table.add_row(f"[bold]{scenario}[/bold]")
+        table.add_row(Text(one_line(str(scenario)), "bold"))
         for _, line in lines.iterrows():
             table.add_row(
                 f"  {marked(line['label'], line['idealised'])}",

@@ -28,7 +28,7 @@ import rich.text
 from rich.console import Console
 
 from gripbench.bench.publishing.latex import latex_line, latex_number, latex_text
-from gripbench.errors import InputError, nearest, unknown
+from gripbench.errors import InputError, nearest, one_line, unknown
 
 MISSING = "–"
 """What a renderer shows where there is no value; CSV leaves the cell empty."""
@@ -173,14 +173,14 @@ def terminal(table: Table) -> rich.table.Table:
     """Return a table that rich prints."""
     shown = rich.table.Table(
         box=rich.box.SIMPLE_HEAD,
-        title=table.caption or None,
-        caption="\n".join(table.notes) or None,
+        title=rich.text.Text(one_line(table.caption)) if table.caption else None,
+        caption=rich.text.Text("\n".join(map(one_line, table.notes))) if table.notes else None,
         title_justify="left",
         caption_justify="left",
     )
     for column in table.columns:
         shown.add_column(
-            rich.text.Text(column.heading),
+            rich.text.Text(one_line(column.heading)),
             justify="right" if _is_numeric(table, column) else "left",
             no_wrap=_is_numeric(table, column),
         )
@@ -189,7 +189,8 @@ def terminal(table: Table) -> rich.table.Table:
         for row in group:
             cells = [
                 rich.text.Text(
-                    table.text(row, column), style="bold" if (row, column.key) in best else ""
+                    one_line(table.text(row, column)),
+                    style="bold" if (row, column.key) in best else "",
                 )
                 for column in table.columns
             ]
