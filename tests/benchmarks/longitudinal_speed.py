@@ -106,7 +106,7 @@ def _compiled_slope(profiles, grade, end):
     def set_inputs(t):
         at = min(t, end - 1e-12)
         front, rear, friction = (profile_value(at, profile) for profile in profiles)
-        inputs[0] = (front, rear, friction, friction, grade)
+        inputs[0] = (front, rear, friction, friction, grade, 0.0)
 
     def slope(t, x):
         set_inputs(t)

@@ -26,7 +26,7 @@ PLANT = plant_record(CAR)
 
 def _inputs(torque_front, torque_rear, mu, grade):
     inputs = np.zeros(1, INPUT_TYPE)
-    inputs[0] = (torque_front, torque_rear, mu, mu, grade)
+    inputs[0] = (torque_front, torque_rear, mu, mu, grade, 0.0)
     return inputs
 
 

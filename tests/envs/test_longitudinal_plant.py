@@ -33,7 +33,7 @@ grade = st.floats(-0.2, 0.2)
 
 def _inputs(torques, mu, grade):
     inputs = np.zeros(1, INPUT_TYPE)
-    inputs[0] = (*torques, *mu, grade)
+    inputs[0] = (*torques, *mu, grade, 0.0)
     return inputs[0]
 
 
@@ -169,3 +169,27 @@ def test_accelerometer_reads_no_gravity_and_the_slope_pulls_downhill():
     np.testing.assert_allclose(
         truth["speed_x_rate"] - truth["accel_x"], GRAVITY * np.sin(0.05), rtol=1e-12
     )
+
+
+@pytest.mark.parametrize("tyre", ["brush", "dugoff", "magic_formula", "fitted_curve"])
+@pytest.mark.parametrize("slip", [0.004, 0.03, -0.05, 0.3])
+def test_every_tyre_has_the_slopes_of_its_force_and_the_stiffness_on_paper(tyre, slip):
+    record = plant_record(CAR, tyre)
+    speed = 12.0
+    spin = (speed / (1.0 - slip) if slip > 0.0 else speed * (1.0 + slip)) / RADIUS
+
+    def force(v, w):
+        tyres = np.zeros(1, TYRE_TYPE)
+        evaluate_tyres(np.array([v, w, w]), record[0], tyres[0])
+        return tyres[0]["front"]
+
+    tyres = np.zeros(1, TYRE_TYPE)
+    evaluate_tyres(np.array([speed, spin, spin]), record[0], tyres[0])
+    step = 1e-6
+    to_wheel = (force(speed, spin + step) - force(speed, spin - step)) / (2.0 * step)
+    to_speed = (force(speed + step, spin) - force(speed - step, spin)) / (2.0 * step)
+    assert tyres[0]["front_wheel"] == pytest.approx(to_wheel, rel=1e-4, abs=1e-7)
+    assert tyres[0]["front_speed"] == pytest.approx(to_speed, rel=1e-4, abs=1e-7)
+    rolling = speed / RADIUS
+    slope = force(speed, rolling * (1.0 + 1e-7)) / 1e-7
+    assert slope == pytest.approx(CAR["magic_b"] * CAR["magic_c"], rel=1e-4)

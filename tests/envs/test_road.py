@@ -18,13 +18,14 @@ NO_PATH = np.zeros(0)
 
 def test_noise_has_its_deviation_and_correlation_length():
     road = Road(mu=0.5, bank_std=0.01, grade_std=0.02, correlation_length=40.0)
-    bank, grade = lay_road(road, NO_PATH, 60000.0, 7).profile.T
+    bank, grade, surface = lay_road(road, NO_PATH, 60000.0, 7).profile.T
     lag = round(40.0 / SPACING)
     for profile, deviation in ((bank, 0.01), (grade, 0.02)):
         assert profile.std() == pytest.approx(deviation, rel=0.1)
         correlation = np.corrcoef(profile[:-lag], profile[lag:])[0, 1]
         assert correlation == pytest.approx(math.exp(-1.0), abs=0.1)
     assert abs(np.corrcoef(bank, grade)[0, 1]) < 0.15
+    assert (surface == 1.0).all()
 
 
 def test_profiles_depend_on_the_seed_alone():

@@ -202,3 +202,86 @@ def test_a_rate_above_that_of_the_samples_is_refused():
     with pytest.raises(InputError, match=r"sensors\.accel_x\.rate is 1500 Hz: faster than .* 1000"):
         SensorSuite({"accel_x": Sensor(rate=1500.0)}, TRUTH, 1e-3, 0)
     SensorSuite({"accel_x": Sensor(rate=1000.0)}, TRUTH, 1e-3, 0)
+
+
+PLANAR = record_type(("time", "speed_x", "speed_y", "accel_x", "accel_y", "accel_z", "yaw_rate"))
+
+
+def _observe_planar(sensors, n=400, **channels):
+    truth = np.zeros(n, PLANAR)
+    truth["time"] = np.arange(n) * DT
+    for name, values in channels.items():
+        truth[name] = values
+    return SensorSuite(sensors, PLANAR, DT, 0).observe(truth)
+
+
+@pytest.mark.parametrize("speed", [0.7, 3.3, 40.0])
+def test_wheel_pulses_of_a_steady_wheel_give_its_speed(speed):
+    sensor = {"wheel_speed_front": Sensor(pulses=48, rate=100.0)}
+    seen = _observe(sensor, _truth(4000, wheel_speed_front=speed))["wheel_speed_front"]
+    np.testing.assert_allclose(seen[1000:], speed, rtol=1e-9)
+
+
+def test_wheel_pulses_give_the_mean_between_two_teeth():
+    rate = 100.0
+    truth = _truth(5000, wheel_speed_front=5.0 + 3.0 * np.arange(5000) * DT)
+    seen = _observe({"wheel_speed_front": Sensor(pulses=48, rate=rate)}, truth)
+    reading = seen["wheel_speed_front"][1000:]
+    # the mean over at most a reading and two teeth lags by half of that
+    most = 3.0 * (1.0 / rate + 2.0 * 2.0 * np.pi / 48 / 8.0)
+    lag = truth["wheel_speed_front"][1000:] - reading
+    assert (lag > 0.0).all()
+    assert lag.max() < most
+
+
+def test_a_wheel_that_stops_has_no_teeth_and_its_reading_decays():
+    speed = np.where(np.arange(5000) < 2500, 10.0, 0.0)
+    sensor = {"wheel_speed_front": Sensor(pulses=48, rate=100.0)}
+    seen = _observe(sensor, _truth(wheel_speed_front=speed))["wheel_speed_front"]
+    assert seen[2400] == pytest.approx(10.0)
+    tooth = 2.0 * np.pi / 48
+    for k in (3000, 4000, 4990):
+        assert seen[k] == pytest.approx(tooth / ((k - 2500) * DT), rel=0.05)
+
+
+def test_a_lever_arm_feels_the_turn_of_the_vehicle():
+    time = np.arange(400) * DT
+    yaw_rate = 0.4 + 2.0 * time
+    arm = {"lever_x": 1.2, "lever_y": -0.3}
+    seen = _observe_planar(
+        {"accel_x": Sensor(**arm), "accel_y": Sensor(**arm), "speed_y": Sensor(lever_x=1.2)},
+        yaw_rate=yaw_rate, accel_x=1.0, accel_y=2.0, speed_y=0.1,
+    )  # fmt: skip
+    after = slice(1, None)  # the first sample knows no change yet
+    expected_x = 1.0 - 1.2 * yaw_rate**2 + 0.3 * 2.0
+    expected_y = 2.0 + 0.3 * yaw_rate**2 + 1.2 * 2.0
+    np.testing.assert_allclose(seen["accel_x"][after], expected_x[after], rtol=1e-9)
+    np.testing.assert_allclose(seen["accel_y"][after], expected_y[after], rtol=1e-9)
+    np.testing.assert_allclose(seen["speed_y"], 0.1 + 1.2 * yaw_rate, rtol=1e-12)
+
+
+def test_a_misaligned_axis_mixes_two():
+    seen = _observe_planar(
+        {"accel_y": Sensor(cross="accel_z", misalignment=0.02)}, accel_y=1.0, accel_z=9.81
+    )
+    expected = np.cos(0.02) * 1.0 + np.sin(0.02) * 9.81
+    np.testing.assert_allclose(seen["accel_y"], expected, rtol=1e-12)
+
+
+def test_a_gain_of_its_own_below_zero():
+    truth = _truth(accel_x=np.where(np.arange(5000) < 2000, 2.0, -2.0))
+    seen = _observe({"accel_x": Sensor(scale=1.1, negative_scale=0.9)}, truth)["accel_x"]
+    assert seen[0] == pytest.approx(2.2)
+    assert seen[-1] == pytest.approx(-1.98)
+
+
+@pytest.mark.parametrize(
+    ("sensor", "message"),
+    [
+        ({"accel_x": Sensor(cross="accel_y", misalignment=0.1)}, "accel_x.cross.*'accel_y'"),
+        ({"accel_x": Sensor(lever_x=1.0)}, "accel_x.lever_x.*'yaw_rate'"),
+    ],
+)
+def test_what_a_plant_does_not_have_is_named(sensor, message):
+    with pytest.raises(InputError, match=message):
+        SensorSuite(sensor, TRUTH, DT, 0)
