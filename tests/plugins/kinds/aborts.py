@@ -1,0 +1,18 @@
+"""It aborts."""
+
+import os
+
+
+class Aborts:
+    name = "aborts"
+    sensors = ("accel_x",)
+    estimates = ("mu_front",)
+
+    def reset(self, vehicle, dt):
+        self.samples = 0
+
+    def update(self, obs):
+        self.samples += 1
+        if self.samples == 100:
+            os.abort()
+        return {"mu_front": 0.5}

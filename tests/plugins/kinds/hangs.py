@@ -1,0 +1,17 @@
+"""An endless loop."""
+
+
+class Hangs:
+    name = "hangs"
+    sensors = ("accel_x",)
+    estimates = ("mu_front",)
+
+    def reset(self, vehicle, dt):
+        self.samples = 0
+
+    def update(self, obs):
+        self.samples += 1
+        if self.samples == 100:
+            while True:
+                pass
+        return {"mu_front": 0.5}

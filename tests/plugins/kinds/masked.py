@@ -1,0 +1,18 @@
+"""A masked value."""
+
+import numpy as np
+
+
+class Masked:
+    name = "masked"
+    sensors = ("accel_x",)
+    estimates = ("mu_front",)
+
+    def reset(self, vehicle, dt):
+        self.samples = 0
+
+    def update(self, obs):
+        self.samples += 1
+        if self.samples == 100:
+            return {"mu_front": np.ma.masked}
+        return {"mu_front": 0.5}
