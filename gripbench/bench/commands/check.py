@@ -35,6 +35,13 @@ def check(
     time_limit: Annotated[
         float, typer.Option(help="Seconds that one run of it over one recording may take.")
     ] = 60.0,
+    sandbox: Annotated[
+        str,
+        typer.Option(
+            envvar="GRIPBENCH_SANDBOX",
+            help="bubblewrap: methods that are not built in also have no network and cannot write.",
+        ),
+    ] = "",
     memory_limit: Annotated[float, typer.Option(help="MiB that it may take.")] = 2048.0,
     results: Annotated[
         Path, typer.Option(help="Folder of the stored rows, beside which the result is kept.")
@@ -45,7 +52,9 @@ def check(
     from gripbench.bench.publishing.presentation import console
     from gripbench.bench.running.api import limits_of
     from gripbench.bench.running.check_records import keep_record
+    from gripbench.bench.running.processes import choose_sandbox
 
+    choose_sandbox(sandbox)
     out = console()
     with out.status("") as status:
 

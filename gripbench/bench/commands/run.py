@@ -60,6 +60,13 @@ def run(
     time_limit: Annotated[
         float, typer.Option(help="Seconds that one cell of a method of yours may take.")
     ] = 60.0,
+    sandbox: Annotated[
+        str,
+        typer.Option(
+            envvar="GRIPBENCH_SANDBOX",
+            help="bubblewrap: methods that are not built in also have no network and cannot write.",
+        ),
+    ] = "",
     memory_limit: Annotated[
         float, typer.Option(help="MiB that a method of yours may take.")
     ] = 2048.0,
@@ -79,6 +86,7 @@ def run(
     from gripbench.bench.ranking.summary import scores_csv, summary
     from gripbench.bench.running.api import limits_of, order_in, plan_of
     from gripbench.bench.running.backends import Backend
+    from gripbench.bench.running.processes import choose_sandbox
     from gripbench.bench.running.recorded_scenarios import PREFIX
     from gripbench.bench.running.rows import Row, frame_of, untracked
     from gripbench.bench.running.runner import InterruptedRun, run_plan
@@ -86,6 +94,7 @@ def run(
     from gripbench.errors import InterruptionError
     from gripbench.writing import check_writable, write_atomically
 
+    choose_sandbox(sandbox)
     if export is not None:
         check_writable(export)
     chosen = [*(scenario or []), *(f"{PREFIX}{place}" for place in recording or [])]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import shutil
 import socket
 import subprocess
 import sys
@@ -20,7 +21,7 @@ import gripbench
 from gripbench.bench.running.confinement import end_tree
 from gripbench.bench.running.lines import LateError, Line
 from gripbench.bench.running.messages import message_bytes, read_message
-from gripbench.errors import GripbenchError
+from gripbench.errors import GripbenchError, InputError, unknown
 
 FORKS = sys.platform == "linux"
 """Whether processes of plug-ins are forked; elsewhere forking is not safe, or not there."""
@@ -75,6 +76,47 @@ def _command(forks: bool) -> list[str]:
     places = [os.path.abspath(place) for place in given if place]
     # -P: neither the current folder nor a script's own comes before the libraries.
     return [sys.executable, "-P", "-c", START, package, "forks" if forks else "-", *places]
+
+
+BUBBLEWRAP = "bubblewrap"
+
+SANDBOXES = ("", BUBBLEWRAP)
+"""Kinds of sandboxes: the system's own means, or bubblewrap where it is installed."""
+
+VARIABLE = "GRIPBENCH_SANDBOX"
+"""Variable of the environment that names the kind of sandbox."""
+
+
+def sandbox_kind(name: str) -> str:
+    """Return a kind of sandbox that can be had here.
+
+    Raises
+    ------
+    InputError
+        If nobody knows it, or it is not installed.
+    """
+    if name not in SANDBOXES:
+        raise unknown("sandbox", name, [BUBBLEWRAP])
+    if name and (not FORKS or shutil.which("bwrap") is None):
+        raise InputError(f"sandbox '{name}': needs Linux with the program 'bwrap' (bubblewrap)")
+    return name
+
+
+def choose_sandbox(name: str) -> None:
+    """Have this process, and the workers that it starts, use a kind of sandbox from now on."""
+    os.environ[VARIABLE] = sandbox_kind(name)
+
+
+def _wrapped(command: list[str], folder: str) -> list[str]:
+    """Return a command in bubblewrap: no network, no other processes, nothing can be written."""
+    places = dict.fromkeys((folder, command[4], sys.prefix, sys.base_prefix, *command[6:]))
+    bound = [item for place in places if Path(place).exists() for item in
+             ("--ro-bind", place, place)]  # fmt: skip
+    return [
+        "bwrap", "--unshare-all", "--ro-bind", "/", "/", "--dev", "/dev", "--proc", "/proc",
+        "--tmpfs", "/tmp", *bound, "--setenv", "NUMBA_CACHE_DIR", "/tmp/numba",
+        "--setenv", "TMPDIR", "/tmp", "--chdir", "/", *command,
+    ]  # fmt: skip
 
 
 class PluginProcess:
@@ -173,11 +215,12 @@ class PluginProcess:
 class _Starter:
     """The interpreter that forks processes of plug-ins."""
 
-    def __init__(self) -> None:
+    def __init__(self, kind: str, folder: str) -> None:
+        command = _command(forks=True)
         ours, theirs = socket.socketpair()
         self._lock = threading.Lock()
         self._process = subprocess.Popen(
-            _command(forks=True),
+            _wrapped(command, folder or os.getcwd()) if sandbox_kind(kind) else command,
             stdin=theirs.fileno(),
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
@@ -239,24 +282,33 @@ class _Starter:
         return read_message(lambda length: self._line.receive(length, deadline))
 
 
-_starters: list[_Starter] = []
+_starters: dict[tuple[str, str], _Starter] = {}
 _lock = threading.Lock()
 
 
-def start_plugin() -> PluginProcess:
+def start_plugin(kind: str = "", folder: str = "") -> PluginProcess:
     """Return a new process that waits for a plug-in to load.
+
+    Parameters
+    ----------
+    kind
+        Kind of sandbox, of `SANDBOXES`.
+    folder
+        The plug-in's folder, which it has to see.
 
     Raises
     ------
     GripbenchError
         If no interpreter can be started.
     """
-    if not FORKS:
+    if sandbox_kind(kind) == "" and not FORKS:
         return _alone()
+    serves = (kind, folder if kind else "")
     with _lock:
-        if not _starters or not _starters[0].alive:
-            _starters[:] = [_Starter()]
-        return _starters[0].start()
+        starter = _starters.get(serves)
+        if starter is None or not starter.alive:
+            starter = _starters[serves] = _Starter(kind, folder)
+        return starter.start()
 
 
 def _alone() -> PluginProcess:
@@ -291,4 +343,4 @@ def stop_starters() -> None:
     """End the starter of this process, if it has one."""
     with _lock:
         while _starters:
-            _starters.pop().close()
+            _starters.popitem()[1].close()

@@ -14,7 +14,7 @@ import os
 import signal as signals
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -33,7 +33,7 @@ from gripbench.bench.running.messages import (
     reply_type,
     requests_of,
 )
-from gripbench.bench.running.processes import PluginProcess, start_plugin, stop_starters
+from gripbench.bench.running.processes import VARIABLE, PluginProcess, start_plugin, stop_starters
 from gripbench.envs.recordings import select_channels
 from gripbench.envs.signals import record_type
 from gripbench.errors import LONGEST, GripbenchError, InputError, one_line
@@ -55,10 +55,14 @@ class Limits:
         Wall-clock time [s] of its samples; loading and compiling come before.
     memory
         Memory [bytes] beyond what the empty process has.
+    sandbox
+        Kind of sandbox, of `processes.SANDBOXES`; by default what the environment's variable
+        GRIPBENCH_SANDBOX says.
     """
 
     time: float = 60.0
     memory: int = 2 * 1024**3
+    sandbox: str = field(default_factory=lambda: os.environ.get(VARIABLE, ""))
 
 
 class CellFailure(GripbenchError):  # noqa: N818 - a result of a cell, not a mistake of the harness
@@ -195,10 +199,11 @@ class Sandbox:
             if before == settings:
                 return loaded
         self.close()
-        self._process = process = start_plugin()
+        message = _loading(settings, self.limits, self._bounds)
+        self._process = process = start_plugin(self.limits.sandbox, message["folder"])
         line, limit = process.line, max(self.limits.time, LOADING)
         deadline = time.monotonic() + limit
-        answer = self._answer(line, deadline, limit, _loading(settings, self.limits, self._bounds))
+        answer = self._answer(line, deadline, limit, message)
         try:
             loaded = Loaded(
                 declaration_from(answer["declaration"]),
@@ -489,9 +494,6 @@ def _last_words(code: int | None) -> str:
     return f"its process exited with code {code}"
 
 
-_declaring = Sandbox(Limits())
-
-
 def declare(source: Source, variant: str, parameters: dict[str, Any]) -> Declaration:
     """Return what a method declares, without running its code in this process.
 
@@ -500,17 +502,17 @@ def declare(source: Source, variant: str, parameters: dict[str, Any]) -> Declara
     InputError
         If it cannot be loaded, or declares what is not possible.
     """
+    sandbox = Sandbox(Limits())
     try:
-        return _declaring.declare(source, variant, parameters)
+        return sandbox.declare(source, variant, parameters)
     except CellFailure as error:
         text = str(error)
         place = source.target.rstrip(":")
         raise InputError(text if place.split(":")[0] in text else f"{place}: {text}") from None
     finally:
-        _declaring.close()
+        sandbox.close()
 
 
 def end_declaring() -> None:
     """End what this process keeps to start the processes of plug-ins."""
-    _declaring.close()
     stop_starters()
