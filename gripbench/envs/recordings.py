@@ -58,6 +58,8 @@ class Recording:
         Further facts of the run that a score may need (such as the time of a friction step).
     windows
         Named lists of intervals [s], such as `train` and `test`; empty for a simulated run.
+    clean
+        The observations without the faults of the instruments; None where there are none.
     bounds
         Intervals in which signals are known to lie where the truth is not known.
     """
@@ -72,3 +74,4 @@ class Recording:
     notes: dict[str, float] = field(default_factory=dict)
     windows: dict[str, tuple[tuple[float, float], ...]] = field(default_factory=dict)
     bounds: tuple[Bounds, ...] = ()
+    clean: npt.NDArray[Any] | None = None

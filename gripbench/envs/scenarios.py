@@ -45,6 +45,9 @@ class Scenario(Configuration):
         Sensors that differ from the suite's, or come on top.
     score_from
         Samples before this time [s] do not count in any score.
+    faults
+        Faults of the instruments, as `NAME:SEVERITY` or `NAME:SEVERITY:CHANNEL`; they stand
+        behind the scenario's name, each after a `+`.
     population
         Name or path of the population from which a seed draws a car, a road, a drive and
         instruments; empty: the scenario has one car only.
@@ -53,7 +56,7 @@ class Scenario(Configuration):
         at a level above 0 ends with `@` and the level.
     """
 
-    name: str = Field(pattern=r"^[a-z][a-z0-9_]*(@[1-9])?$")
+    name: str = Field(pattern=r"^[a-z][a-z0-9_]*(@[1-9])?(\+[a-z0-9_:]+)*$")
     environment: str = Field(default="", pattern=r"^(gripbench/[A-Z][A-Za-z0-9]*-v[0-9]+)?$")
     description: str
     world: str
@@ -64,6 +67,7 @@ class Scenario(Configuration):
     sensor_suite: str
     sensors: dict[str, Sensor] = {}
     score_from: float = Field(default=0.0, ge=0.0)
+    faults: tuple[str, ...] = ()
     population: str = ""
     level: int = Field(default=0, ge=0, le=LEVELS[-1])
 
@@ -79,7 +83,7 @@ class Scenario(Configuration):
 
     @model_validator(mode="after")
     def _check_level(self) -> Self:
-        _, _, level = self.name.partition("@")
+        _, _, level = self.name.partition("+")[0].partition("@")
         if int(level or 0) != self.level:
             raise ValueError(f"name {self.name!r} does not say level {self.level}")
         return self

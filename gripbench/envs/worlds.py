@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -12,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gripbench.configuration import CONFIGS, named_file, parse, read_toml
+from gripbench.envs.instruments.faults import Faults, check_present, choose_fault, split_faults
 from gripbench.envs.instruments.sensors import Sensor, SensorSuite
 from gripbench.envs.plants.bicycle import BicycleScenario, BicycleSimulation
 from gripbench.envs.plants.longitudinal.world import (
@@ -85,6 +87,9 @@ def load_scenario(name: str) -> Scenario:
     InputError
         If there is no such scenario or its file has a mistake.
     """
+    plain, faults = split_faults(name)
+    if faults:
+        return with_faults(load_scenario(plain), faults)
     place, level = split_level(name)
     if level or place != name:
         return at_level(load_scenario(place), level)
@@ -113,7 +118,7 @@ def at_level(scenario: Scenario, level: int) -> Scenario:
     InputError
         If there is no such level, or the scenario names no population.
     """
-    name = scenario.name.partition("@")[0]
+    name = re.split("[@+]", scenario.name)[0]
     if level not in LEVELS:
         known = ", ".join(map(str, LEVELS))
         raise InputError(f"{name}: unknown level {level}: known: {known}")
@@ -126,8 +131,47 @@ def at_level(scenario: Scenario, level: int) -> Scenario:
             load_vehicle(scenario.vehicle).values(),
             population_path(scenario.population),
         )
-    changes = {"name": f"{name}@{level}" if level else name, "level": level}
-    return scenario.model_copy(update=changes)
+    full = "+".join((f"{name}@{level}" if level else name, *scenario.faults))
+    return scenario.model_copy(update={"name": full, "level": level})
+
+
+def with_faults(scenario: Scenario, faults: Sequence[str]) -> Scenario:
+    """Return a scenario with faults of its instruments; its name then ends with them.
+
+    Parameters
+    ----------
+    scenario
+        At any level; faults that it has already act first.
+    faults
+        Each `NAME:SEVERITY` or `NAME:SEVERITY:CHANNEL`.
+
+    Raises
+    ------
+    InputError
+        If there is no such fault or severity, or it acts on nothing that the instruments give.
+    """
+    chosen = [choose_fault(text) for text in faults]
+    if scenario.integrator == PAPER_SOLVER and not scenario.level:
+        raise InputError(f"{scenario.name}: faults need equally spaced samples, which it has not")
+    for one in chosen:
+        check_present(one, list(sensors_of(scenario, 0)))
+    names = tuple(one.name for one in chosen)
+    return scenario.model_copy(
+        update={
+            "name": "+".join((scenario.name, *names)),
+            "faults": (*scenario.faults, *names),
+        }
+    )
+
+
+def faults_of(
+    scenario: Scenario, observation_type: np.dtype[Any], sample_time: float | None, seed: int
+) -> Faults | None:
+    """Return the faults of a run; None where the scenario has none."""
+    if not scenario.faults:
+        return None
+    chosen = [choose_fault(text) for text in scenario.faults]
+    return Faults(chosen, observation_type, sample_time, scenario.horizon, seed)
 
 
 def split_level(name: str) -> tuple[str, int]:
@@ -248,13 +292,22 @@ def record(
     simulation = known_worlds()[scenario.world].simulation(drawn.scenario, drawn.road)
     truth = simulation.run(seed)
     suite = SensorSuite(drawn.sensors, simulation.truth_type, simulation.sample_time, seed)
+    observations, notes, clean = suite.observe(truth), simulation.notes(), None
+    faults = faults_of(scenario, suite.observation_type, simulation.sample_time, seed)
+    if faults is not None:
+        clean = observations.copy()
+        faults.apply(observations)
+        notes = notes | dict(
+            zip(("fault_begin", "fault_end"), map(float, faults.window), strict=True)
+        )
     return Recording(
         scenario=scenario.name,
         seed=seed,
         vehicle=drawn.paper,
-        observations=suite.observe(truth),
+        observations=observations,
         truth=truth,
         score_from=scenario.score_from,
         termination=simulation.termination,
-        notes=simulation.notes(),
+        notes=notes,
+        clean=clean,
     )

@@ -27,8 +27,15 @@ from pydantic import Field
 from gripbench import methods as built_in
 from gripbench.bench.catalogue.declarations import Declaration, Source, declaration_of
 from gripbench.configuration import CONFIGS, Configuration, named_file, parse, read_toml
+from gripbench.envs.instruments.faults import split_faults
 from gripbench.envs.scenarios import LEVELS, Scenario
-from gripbench.envs.worlds import at_level, load_scenario, scenario_files, split_level
+from gripbench.envs.worlds import (
+    at_level,
+    load_scenario,
+    scenario_files,
+    split_level,
+    with_faults,
+)
 from gripbench.errors import InputError, unknown
 from gripbench.extensions import entry_points, load
 from gripbench.methods.contract import CompiledMethod
@@ -380,7 +387,8 @@ def all_scenario_files() -> dict[str, Path]:
 def find_scenario(name: str) -> Scenario:
     """Return a scenario by name, by the path of a TOML file, or as `recording:NAME`.
 
-    `NAME@LEVEL` is the scenario at a level of its population.
+    `NAME@LEVEL` is the scenario at a level of its population, `NAME+FAULT:SEVERITY` one with a
+    fault of its instruments.
 
     Raises
     ------
@@ -391,6 +399,9 @@ def find_scenario(name: str) -> Scenario:
         from gripbench.bench.running.recorded_scenarios import recorded_scenario  # reads the log
 
         return recorded_scenario(name)
+    plain, faults = split_faults(name)
+    if faults:
+        return with_faults(find_scenario(plain), faults)
     files = all_scenario_files()
     place, level = split_level(name)
     if not place.endswith(".toml"):

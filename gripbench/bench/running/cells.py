@@ -25,6 +25,7 @@ from gripbench.bench.running.recorded_scenarios import RecordedScenario, judged,
 from gripbench.bench.running.rows import Row, Status
 from gripbench.bench.running.sandbox import CellFailure, Limits, Sandbox
 from gripbench.bench.running.store import row_path
+from gripbench.bench.scoring.recovery import RECOVERY, recovery
 from gripbench.bench.scoring.scoring import DivergedError, score, targets_of
 from gripbench.envs.recordings import Recording
 from gripbench.envs.scenarios import Scenario
@@ -170,6 +171,12 @@ def run_cell(cell: Cell, recording: Recording, limits: Limits, timed: bool) -> R
         if isinstance(cell.scenario, RecordedScenario):
             recording = judged(recording, outcome.estimates)
         scores = score(outcome.estimates, declaration.outputs, targets, recording)
+        if recording.clean is not None:
+            twin = _outcome(cell, replace(recording, observations=recording.clean), limits, False)
+            for target in scores:
+                value = recovery(outcome.estimates, twin.estimates, target, recording)
+                if value is not None:
+                    scores[target][RECOVERY] = value
     except DivergedError as error:
         return _resting_on(cell, _row(cell, targets, "diverged", str(error)), read)
     except SkippedError as error:

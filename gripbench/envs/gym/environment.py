@@ -122,6 +122,7 @@ class VehicleEnvironment(gymnasium.Env[Observation, npt.NDArray[np.float64]]):
         self._steps = 0
         self._going = True
         self._measuring = self._episodes.suite(self.simulation, run)
+        self._faults = self._episodes.faults(self.simulation, run)
         truth = self.simulation.reset(run)
         if self._view is not None:
             self._view.begin(truth[0], self.simulation.path())
@@ -170,7 +171,10 @@ class VehicleEnvironment(gymnasium.Env[Observation, npt.NDArray[np.float64]]):
         return self.action_map.action(self.simulation.drive())
 
     def _sample(self, truth: npt.NDArray[Any]) -> tuple[Observation, dict[str, Any]]:
-        observation = self._episodes.observation(self._measuring.observe(truth)[0])
+        observed = self._measuring.observe(truth)
+        if self._faults is not None:
+            self._faults.apply(observed)
+        observation = self._episodes.observation(observed[0])
         info = {
             "truth": dict(zip(truth.dtype.names or (), truth[0].item(), strict=True)),
             "termination": self.simulation.termination,

@@ -9,12 +9,13 @@ import numpy.typing as npt
 from gymnasium import spaces
 
 from gripbench.envs.gym.arguments import scenario_with
+from gripbench.envs.instruments.faults import Faults
 from gripbench.envs.instruments.sensors import SensorSuite
 from gripbench.envs.plants.simulation import Simulation
 from gripbench.envs.populations.draws import paper_of
 from gripbench.envs.scenarios import Scenario
 from gripbench.envs.signals import NEW, signal
-from gripbench.envs.worlds import load_scenario, sensors_of, simulation_of
+from gripbench.envs.worlds import faults_of, load_scenario, sensors_of, simulation_of
 
 _LARGEST = {
     "s": 1e5,
@@ -68,7 +69,8 @@ class Episodes:
         self.scenario = load_scenario(scenario)
         self.vehicle = paper_of(self.scenario)
         self._sensors = self.scenario.all_sensors()
-        names = self.suite(self.simulation(), 0).observation_type.names or ()
+        self._observed = self.suite(self.simulation(), 0).observation_type
+        names = self._observed.names or ()
         self.channels = tuple(
             name for name in names if idealised or not signal(name.removesuffix(NEW)).idealised
         )
@@ -85,6 +87,10 @@ class Episodes:
         """Return the sensors of the episode with a seed; they have not measured yet."""
         sensors = sensors_of(self.scenario, seed) if self.scenario.level else self._sensors
         return SensorSuite(sensors, simulation.truth_type, simulation.sample_time, seed)
+
+    def faults(self, simulation: Simulation, seed: int) -> Faults | None:
+        """Return the faults of the episode with a seed; None where the scenario has none."""
+        return faults_of(self.scenario, self._observed, simulation.sample_time, seed)
 
     def observation(
         self, observed: npt.NDArray[Any] | np.void

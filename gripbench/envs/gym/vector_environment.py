@@ -28,6 +28,7 @@ from gripbench.envs.gym.arguments import (
 from gripbench.envs.gym.environment import ActionMap
 from gripbench.envs.gym.episodes import Episodes, observation_space
 from gripbench.envs.gym.rendering import RENDER_MODES, TopView, checked_mode
+from gripbench.envs.instruments.faults import Faults
 from gripbench.envs.instruments.sensors import SensorLanes
 
 Observations = dict[str, npt.NDArray[np.float64]]
@@ -95,6 +96,7 @@ class VehicleVectorEnvironment(VectorEnv[Observations, npt.NDArray[np.float64], 
             TopView(self.scenario, self.render_mode)
             for _ in range(self.num_envs if self.render_mode else 0)
         ]
+        self._faults: list[Faults | None] = [None] * self.num_envs
         self._streams: list[np.random.Generator | None] = [None] * self.num_envs
         self._seeds = [-1] * self.num_envs
         self._observed = np.zeros(self.num_envs, self._measuring.observation_type)
@@ -214,6 +216,7 @@ class VehicleVectorEnvironment(VectorEnv[Observations, npt.NDArray[np.float64], 
             self._changed[lane] = simulation is not None
         first = self._lanes.reset(lane, run)[0]
         self._measuring.replace(lane, self._episodes.suite(self._own[lane], run))
+        self._faults[lane] = self._episodes.faults(self._own[lane], run)
         self._steps[lane] = 0
         self._ended[lane] = False
         if self._views:
@@ -228,7 +231,12 @@ class VehicleVectorEnvironment(VectorEnv[Observations, npt.NDArray[np.float64], 
         return stream
 
     def _observe(self, truth: npt.NDArray[Any], lanes: npt.NDArray[np.intp]) -> None:
-        self._observed[lanes] = self._measuring.observe(truth, lanes)[lanes]
+        observed = self._measuring.observe(truth, lanes)
+        for lane in lanes:
+            faults = self._faults[lane]
+            if faults is not None:
+                faults.apply(observed[lane : lane + 1])
+        self._observed[lanes] = observed[lanes]
 
     def _follow(self, truth: npt.NDArray[Any], lanes: npt.NDArray[np.intp]) -> None:
         if self._views:

@@ -287,7 +287,11 @@ class BicycleSimulation(Simulation):
 
     def drive(self) -> npt.NDArray[np.float64]:
         """Return the driver's next action, shape (1,)."""
-        decide(self._run, self._sample)
+        if (
+            self._decided != self._sample
+        ):  # the driver's arms move once a sample, however often asked
+            decide(self._run, self._sample)
+            self._decided = self._sample
         return self._run.action[:1].copy()
 
     def advance(self, action: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
@@ -320,7 +324,7 @@ class BicycleSimulation(Simulation):
     def _start(self, seed: int) -> None:
         scenario = self._scenario
         self.termination = ""
-        self._sample = 0
+        self._sample, self._decided = 0, -1
         path = scenario.lay_path(seed)
         heading = stream(seed, "heading").uniform(-math.pi, math.pi)
         ground = lay_road(scenario.road, path[:, 3], scenario.longest(), seed)

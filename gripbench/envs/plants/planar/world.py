@@ -90,7 +90,7 @@ class PlanarSimulation(Simulation):
         self._plant = plant.plant_record(scenario.tyre, vehicle)
         self._driver = scenario.driver_record()
         self._parts = round(scenario.sample_time / plant.STEP)
-        self._sample = 0
+        self._sample, self._decided = 0, -1
         self._jump_time = math.nan
         self._planned = scenario.plan()
 
@@ -103,7 +103,11 @@ class PlanarSimulation(Simulation):
 
     def drive(self) -> npt.NDArray[np.float64]:
         """Return the driver's next action, shape (5,)."""
-        decide(self._run, self._sample)
+        if (
+            self._decided != self._sample
+        ):  # the driver's arms move once a sample, however often asked
+            decide(self._run, self._sample)
+            self._decided = self._sample
         return self._run.action.copy()
 
     def advance(self, action: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
@@ -149,7 +153,7 @@ class PlanarSimulation(Simulation):
         """Draw whatever is random in the run, and clear what changes."""
         scenario = self._scenario
         self.termination = ""
-        self._sample = 0
+        self._sample, self._decided = 0, -1
         self._jump_time = math.nan
         path = scenario.lay_path(seed)
         ground = lay_road(scenario.road, path[:, 3], scenario.longest(), seed)
