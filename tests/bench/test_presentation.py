@@ -89,3 +89,8 @@ def test_skipped_methods_take_one_line_for_each_reason(capsys):
         "failed: b on one (seed 4): ValueError: no",
         "skipped: a: no sensor for 'x': one, two",
     ]
+
+
+def test_an_interval_has_two_ends_or_is_left_out():
+    assert presentation.bounded(9.07, 9.0699, 9.0701) == "9.07 [9.0699, 9.0701]"
+    assert presentation.bounded(9.07, 9.07, 9.07) == "9.07"

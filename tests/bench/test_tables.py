@@ -171,3 +171,10 @@ def test_unknown_format_names_the_nearest(table, tmp_path):
     with pytest.raises(InputError, match="unknown table format"):
         tables.format_of(tmp_path / "x.docx")
     assert tables.render(table, tables.format_of(tmp_path / "x.tex")) == tables.latex(table)
+
+
+def test_a_number_of_thousands_has_no_exponent():
+    column = Column("step", "Step", "ns", ".3g")
+    rows = tuple({"step": value} for value in (1163.0, 12.3, 2.5e9, 0.5))
+    table = Table((column,), rows)
+    assert [table.text(row, column) for row in range(4)] == ["1160", "12.3", "2.5e+09", "0.5"]

@@ -48,7 +48,7 @@ def rank(
     """Rank the methods of stored rows with the confidence that their runs allow."""
     from textwrap import fill
 
-    from gripbench.bench.publishing.board_tables import board_table, wins_table
+    from gripbench.bench.publishing.board_tables import board_table, one_table, wins_table
     from gripbench.bench.publishing.leaderboard import usual_targets
     from gripbench.bench.publishing.tables import show
     from gripbench.bench.ranking.answers import words
@@ -69,6 +69,9 @@ def rank(
         reference=reference,
         confidence=confidence,
     )
+    if format_ == "csv" and not wins:
+        show(one_table(found, wide), format_)
+        return
     for number, board in enumerate(found):
         if number:
             print()

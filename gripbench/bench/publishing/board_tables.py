@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -105,7 +105,8 @@ def _wide(board: Board, relative: bool) -> tuple[Column, ...]:
 def _notes(board: Board, wide: bool) -> tuple[str, ...]:
     """Return what stands below a board."""
     notes = [
-        f"{len(board.scenarios)} scenarios, {max(len(board.seeds), 1)} common seeds. A score that "
+        f"{_count(len(board.scenarios), 'scenario')}, "
+        f"{_count(max(len(board.seeds), 1), 'common seed')}. A score that "
         "is marked may be the best; ranks in brackets hold together.",
         *board.notes,
     ]
@@ -200,6 +201,26 @@ def _answer(one: Answer) -> dict[str, Any]:
         "error": f"{error} {one.unit}".rstrip(),
         "better": better,
     }
+
+
+def one_table(boards: Sequence[Board], wide: bool = False) -> Table:
+    """Return boards under each other in one table, each line with its target and sensors."""
+    parts = [board_table(board, wide=wide) for board in boards]
+    columns = {column.key: column for part in parts for column in part.columns}
+    first = (Column("target", "Target"), Column("sensors", "Sensors"))
+    rows = [
+        dict.fromkeys(columns)
+        | dict(row)
+        | {"target": board.target, "sensors": ", ".join(board.sensors) or "any"}
+        for board, part in zip(boards, parts, strict=True)
+        for row in part.rows
+    ]
+    kept = tuple(column for key, column in columns.items() if key not in ("target", "sensors"))
+    return Table((*first, *kept), tuple(rows))
+
+
+def _count(number: int, thing: str) -> str:
+    return f"{number} {thing}" + ("s" if number != 1 else "")
 
 
 def wins_table(board: Board) -> Table:

@@ -85,7 +85,10 @@ def bounded(value: float, low: float, high: float, factor: float = 1.0) -> str:
     text = significant(factor * value)
     if not math.isfinite(low):
         return text
-    return f"{text} [{significant(factor * low)}, {significant(factor * high)}]"
+    ends = significant(factor * low), significant(factor * high)
+    if ends[0] == ends[1] and low != high:
+        ends = significant(factor * low, 5), significant(factor * high, 5)
+    return text if ends[0] == ends[1] else f"{text} [{ends[0]}, {ends[1]}]"
 
 
 def seconds(value: float, low: float, high: float) -> str:

@@ -140,7 +140,7 @@ class Table:
         if isinstance(value, bool | np.bool_):
             return "yes" if value else "no"
         if isinstance(value, numbers.Real):
-            return format(value, column.format)
+            return _without_exponent(format(value, column.format), float(value))
         return str(value)
 
     def best(self) -> frozenset[tuple[int, str]]:
@@ -162,6 +162,11 @@ class Table:
             return [row for row in rows if row == best or bool(self.rows[row][column.tied])]
         shown = self.text(best, column)
         return [row for row in rows if self.text(row, column) == shown]
+
+
+def _without_exponent(text: str, value: float) -> str:
+    """Return a number in full where rounding to a few digits gave it an exponent for nothing."""
+    return f"{float(text):.0f}" if "e+" in text and abs(value) < 1e7 else text
 
 
 def is_missing(value: Any) -> bool:
