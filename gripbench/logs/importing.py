@@ -200,33 +200,7 @@ def _runs(logs: dict[str, Log], channel_map: ChannelMap) -> list[tuple[int, dict
 def _recording(
     logs: dict[str, Log], channel_map: ChannelMap, vehicle: dict[str, float], run: int
 ) -> tuple[Recording, QualityReport]:
-    files = channel_map.log_files()
-
-    def read(name: str, key: str, column: Column, target: str = "") -> Series:
-        short = channel_map.file_of(column)
-        time = files[short].time
-        found = series_of(logs[short], name, key, column, time, vehicle, target)
-        if channel_map.axes == "SAE" and not target and name in SAE_TURNED:
-            found = replace(found, values=-found.values)
-        return found
-
-    series = {
-        key: read(key.partition(".")[2], key, column)
-        for key, column in channel_map.keyed_columns().items()
-    }
-    channels = {s.name: s for key, s in series.items() if key.startswith("channels.")}
-    reference = {
-        s.name: replace(s, times=s.times - s.column.delay)
-        for key, s in series.items()
-        if key.startswith("reference.")
-    }
-    add_sources(channel_map, read, channels, reference)
-    channels = _with_ratios(channels, reference, vehicle)
-    channels, zeros = zeroed(channels)
-    channels, reference = placed(channels, reference, channel_map.sensors)
-    channels = levelled(channels, reference, channel_map.level)
-    channels = derive_channels(channels, channel_map.derived)
-    reference = derive_reference(reference, channel_map.derived)
+    channels, reference, zeros = mapped_series(logs, channel_map, vehicle)
     for name in channel_map.derived.instruments:
         if name not in reference:
             raise InputError(
@@ -264,6 +238,46 @@ def _recording(
         ),
     )
     return recording, report
+
+
+def mapped_series(
+    logs: dict[str, Log], channel_map: ChannelMap, vehicle: dict[str, float]
+) -> tuple[dict[str, Series], dict[str, Series], dict[str, float]]:
+    """Return channels and reference by signal, in SI units at the centre of gravity, and zeros.
+
+    Raises
+    ------
+    InputError
+        On the first mistake in the map or the logs.
+    """
+    files = channel_map.log_files()
+
+    def read(name: str, key: str, column: Column, target: str = "") -> Series:
+        short = channel_map.file_of(column)
+        time = files[short].time
+        found = series_of(logs[short], name, key, column, time, vehicle, target)
+        if channel_map.axes == "SAE" and not target and name in SAE_TURNED:
+            found = replace(found, values=-found.values)
+        return found
+
+    series = {
+        key: read(key.partition(".")[2], key, column)
+        for key, column in channel_map.keyed_columns().items()
+    }
+    channels = {s.name: s for key, s in series.items() if key.startswith("channels.")}
+    reference = {
+        s.name: replace(s, times=s.times - s.column.delay)
+        for key, s in series.items()
+        if key.startswith("reference.")
+    }
+    add_sources(channel_map, read, channels, reference)
+    channels = _with_ratios(channels, reference, vehicle)
+    channels, zeros = zeroed(channels)
+    channels, reference = placed(channels, reference, channel_map.sensors)
+    channels = levelled(channels, reference, channel_map.level)
+    channels = derive_channels(channels, channel_map.derived)
+    reference = derive_reference(reference, channel_map.derived)
+    return channels, reference, zeros
 
 
 def _with_ratios(

@@ -27,6 +27,8 @@ _RARE = ("mrad", "rev", "mrad/s", "deg/h", "rev/s", "ft/s", "mm/s", "ft/s^2", "m
 """Units that nobody meant when another fits."""
 
 _FAR = 2.0  # times a limit
+_MOST_CHOICES = 50_000
+_COST, _COST_OF_SIGN = 0.1, 0.2  # of a change, so that the fewest are made
 _TRIED = 40  # mends at most, the likeliest first
 _PASSES = 3
 _SLOWEST, _FASTEST = 1.0, 2e-5  # s between samples of an inertial sensor
@@ -84,6 +86,56 @@ def misfits(
         channels, reference = _scaled(channels, mend), _scaled(reference, mend)
     series = {s.key: s for s in [*channels.values(), *reference.values()]}
     return found + [_of_lag(lag, series[lag.key]) for lag in late]
+
+
+def settled(
+    channels: dict[str, Series],
+    reference: dict[str, Series],
+    vehicle: dict[str, float],
+    free: set[str],
+) -> dict[str, dict[str, str | float]]:
+    """Return the keys to set so that the laws hold, where the units of `free` are not known.
+
+    Parameters
+    ----------
+    channels, reference, vehicle
+        As for `misfits`.
+    free
+        Keys of the series whose unit nobody wrote; the sign of every series may turn.
+
+    Returns
+    -------
+    The keys of the map by table; empty where all laws hold or no choice makes them hold.
+    """
+    laws = [
+        *limits_of(channels, reference, vehicle),
+        *laws_of(channels, reference, vehicle),
+    ]
+    broken = [law for law in laws if not law.holds({})]
+    if all(law.limit and law.factor <= _FAR for law in broken):
+        return {}
+    series = {s.key: s for s in [*channels.values(), *reference.values()]}
+    bound = sorted({key for law in laws for key in law.powers if key in series})
+    choices: list[list[float]] = []
+    for key in bound:
+        units = [f for f in _changes(series[key]) if f > 0.0] if key in free else []
+        signs = (1.0,) if "speed_x" in key or "speed_gps" in key else (1.0, -1.0)
+        alone = [law for law in laws if law.limit and set(law.powers) == {key}]
+        possible = [f for f in (1.0, *units) if all(law.holds({key: f}) for law in alone)]
+        choices.append([sign * f for f in possible for sign in signs])
+    if math.prod(map(len, choices)) > _MOST_CHOICES:
+        return {}
+    best: tuple[float, dict[str, float]] | None = None
+    for changes in itertools.product(*choices):
+        mend = {key: one for key, one in zip(bound, changes, strict=True) if one != 1.0}
+        if all(law.holds(mend) for law in laws):
+            cost = _misfit(laws, mend) + _COST * len(mend)
+            cost += _COST_OF_SIGN * sum(one < 0.0 for one in mend.values())
+            if best is None or cost < best[0]:
+                best = cost, mend
+    if best is None:
+        return {}
+    return {key: _change_keys(series[key], change) for key, change in best[1].items()}
 
 
 def _of_sampling(channels: dict[str, Series]) -> list[Misfit]:

@@ -15,9 +15,10 @@ from pydantic import ValidationError
 from gripbench.envs.signals import SIGNALS
 from gripbench.errors import GripbenchError
 from gripbench.logs.channel_map import ChannelMap
-from gripbench.logs.importing import assemble
+from gripbench.logs.importing import assemble, mapped_series
 from gripbench.logs.log import Log, LogColumn
 from gripbench.logs.naming import REFERENCE_ALWAYS, Guess, guesses, written_unit
+from gripbench.logs.plausibility import settled
 from gripbench.logs.time_columns import TimeTable, time_table
 from gripbench.logs.units import UNITS, proposed_unit
 
@@ -239,6 +240,14 @@ def _steering(
 
 def _mend_by_physics(made: Draft, logs: dict[str, Log]) -> None:
     """Set units and signs that the log does not tell so that the laws of the vehicle hold."""
+    free = {key for key, entry in made.tables.items() if not entry.told}
+    try:
+        content = ChannelMap.model_validate(made.content())
+        channels, reference, _ = mapped_series(logs, content, {})
+    except (GripbenchError, ValidationError):  # the import will say it
+        return
+    if free:
+        _set(made, settled(channels, reference, {}, free))
     for _ in range(_MENDS):
         try:
             report = assemble(logs, ChannelMap.model_validate(made.content()), {}).report
@@ -253,7 +262,12 @@ def _mend_by_physics(made: Draft, logs: dict[str, Log]) -> None:
         }
         if not changes:
             return
-        for key, keys in changes.items():
+        _set(made, changes)
+
+
+def _set(made: Draft, changes: dict[str, dict[str, Any]]) -> None:
+    for key, keys in changes.items():
+        if key in made.tables:
             made.tables[key].keys |= keys
             said = ", ".join(f"{name} = {_toml(value)}" for name, value in keys.items())
             made.tables[key].reasons.append(f"{said}: so says the physics of the other channels")

@@ -8,7 +8,6 @@ from single_track import MAP, drive
 
 from gripbench.errors import InputError
 from gripbench.logs.importing import import_frame
-from gripbench.logs.log import log_of_frame  # noqa: F401
 
 CHECKS = ("physics", "clock", "limits")
 
@@ -57,7 +56,7 @@ def test_a_late_reference_is_noticed_and_moved_back(frame, late, name):
     middle = slice(200, -200)
     again = np.interp(frame["t"], truth.truth["time"] + truth.notes["time_origin"],
                       truth.truth[signal])  # fmt: skip
-    assert np.sqrt(np.mean((again - clean)[middle] ** 2)) < 0.1 * np.std(clean)
+    assert np.sqrt(np.mean((again - clean)[middle] ** 2)) < 0.2 * np.std(clean)
 
 
 @pytest.mark.parametrize("name", ["v", "ax", "ay", "r", "d", "beta"])
