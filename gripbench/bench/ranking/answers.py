@@ -14,7 +14,7 @@ import pandas as pd
 
 from gripbench.bench.ranking.plans import plan_of, road_of
 from gripbench.bench.ranking.ranking import Board, boards
-from gripbench.envs.signals import signal
+from gripbench.envs.signals import IDEALISED, signal
 from gripbench.errors import InputError
 
 ROADS = ("dry", "wet", "snow", "ice", "changing", "real drive", "unknown")
@@ -112,7 +112,7 @@ def answers(rows: pd.DataFrame, targets: Iterable[str]) -> list[Answer]:
     """Return the answers for every target, plan, kind of road and set of sensors.
 
     A set of sensors is left out where a smaller one gives the same method: what it adds is not
-    used.
+    used. So are sets with a channel that no sensor gives.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def _of_road(rows: pd.DataFrame, target: str, plan: str, road: str) -> list[Answ
     found: list[Answer] = []
     for board in sorted(made, key=lambda board: len(board.sensors)):
         line = best_line(board)
-        if line is None:
+        if line is None or IDEALISED in board.sensors:
             continue
         known = (one for one in found if set(one.sensors) <= set(board.sensors))
         if any(one.method == line["label"] for one in known):

@@ -87,6 +87,8 @@ class Board:
         One line a method from best to worst, with `columns()`.
     guess
         The best baseline that these instruments allow; empty: none was run.
+    runs
+        RMS of each run (index scenario, seed) and method; NaN for a failure.
     p_better
         Adjusted p-value that the method of the row has a lower RMS than that of the column.
     wins
@@ -104,6 +106,7 @@ class Board:
     seeds: tuple[int, ...]
     lines: pd.DataFrame
     guess: str
+    runs: pd.DataFrame
     p_better: pd.DataFrame
     wins: pd.DataFrame
     notes: tuple[str, ...]
@@ -259,6 +262,7 @@ def _board(
         seeds=grid.seeds,
         lines=lines,
         guess=best_baseline(lines),
+        runs=matrix,
         p_better=p_better.reindex(index=complete, columns=complete),
         wins=pd.DataFrame(wins, index=order, columns=order),
         notes=grid.notes,

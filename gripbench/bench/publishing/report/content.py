@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from gripbench.bench.catalogue.registry import load_suite, suite_files
@@ -22,6 +23,8 @@ from gripbench.bench.publishing.tables import Column, Table
 from gripbench.bench.ranking.answers import words
 from gripbench.bench.ranking.plans import road_of
 from gripbench.bench.ranking.ranking import Board, boards
+from gripbench.bench.ranking.resolution import resolution
+from gripbench.bench.ranking.statistics import performance_profile
 from gripbench.bench.ranking.summary import failures, marked, summary
 from gripbench.envs.signals import signal
 from gripbench.errors import InputError
@@ -176,6 +179,20 @@ def front(board: Board) -> list[dict[str, Any]]:
         for line in board.lines.to_dict("records")
         if pd.notna(line["score"]) and pd.notna(line["step_batch"])
     ]
+
+
+def profile(board: Board) -> dict[str, Any]:
+    """Return the performance profile of a board: factors to the best, shares by method."""
+    factors = np.geomspace(1.0, 30.0, 60)
+    runs = board.runs.clip(lower=resolution(board.target))
+    shares = performance_profile(runs.to_numpy(float), factors)
+    return {
+        "factors": [float(value) for value in factors],
+        "methods": {
+            str(label): [float(value) for value in shares[:, i]]
+            for i, label in enumerate(runs.columns)
+        },
+    }
 
 
 def failure_table(rows: pd.DataFrame) -> Table:

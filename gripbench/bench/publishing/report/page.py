@@ -27,11 +27,13 @@ from gripbench.bench.publishing.report.content import (
     heat_map,
     manifests,
     paper_results,
+    profile,
     rows_of_suites,
     shown_board,
     target_words,
     today,
 )
+from gripbench.bench.publishing.report.critical import critical_differences
 from gripbench.bench.publishing.report.series import POINTS, SeriesPlan, all_series
 from gripbench.bench.ranking.answers import answers
 from gripbench.bench.ranking.plans import plan_of
@@ -149,6 +151,7 @@ def page(
         Folder in which reproductions and manifests are looked for.
     """
     found = found_boards(rows, targets)
+    whole = {board.target: board for board in found if not board.sensors}
     data = {
         "targets": {name: target_words(name) for name in targets},
         "methods": list(dict.fromkeys(rows["label"])),
@@ -158,6 +161,7 @@ def page(
             for board in found
             if not board.sensors and (points := front(board))
         },
+        "profiles": {target: profile(board) for target, board in whole.items()},
         "series": series,
         "style": {
             "light": [look.color for look in SERIES],
@@ -171,6 +175,7 @@ def page(
         "answers": _answers(rows, targets),
         "summary": _summary(rows, targets),
         "boards": "\n".join(_board(board) for board in found),
+        "critical": "\n".join(critical_differences(board) for board in whole.values()),
         "papers": _papers(paper_results(results)),
         "failures": _failures(rows),
         "manifest": _manifest(manifests(results)),

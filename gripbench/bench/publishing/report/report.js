@@ -39,8 +39,9 @@
       if (board.hidden) continue;
       const rows = [...board.querySelectorAll("tbody tr")];
       for (const row of rows) row.hidden = !row.textContent.toLowerCase().includes(text);
-      const shown = rows.filter((row) => !row.hidden).length;
-      byId("board-status").textContent = `${shown} of ${rows.length} methods shown`;
+      const methods = rows.filter((row) => row.closest(".narrow"));
+      const shown = methods.filter((row) => !row.hidden).length;
+      byId("board-status").textContent = `${shown} of ${methods.length} methods shown`;
     }
   };
   const chooseTarget = () => {
@@ -193,6 +194,7 @@
     }], layout({
       xaxis: axis("", { side: "top", tickangle: -30, showgrid: false }),
       yaxis: axis("", { autorange: "reversed", showgrid: false }),
+      modebar: { orientation: "h", bgcolor: "rgba(0,0,0,0)", color: colour("--muted") }, // above the colour bar
     }));
   };
 
@@ -290,6 +292,21 @@
     }));
   };
 
+  const drawProfile = () => {
+    const { factors, methods } = data.profiles[byId("profile-target").value];
+    const traces = Object.entries(methods).map(([label, shares]) => {
+      const { color, dash } = look(order(label));
+      return { x: factors, y: shares, name: label, mode: "lines", line: { color, dash, width: 2, shape: "hv" },
+        hovertemplate: `${label}<br>within %{x:.3g} of the best in %{y:.0%}<extra></extra>` };
+    });
+    react("profile-plot", traces, layout({
+      xaxis: axis("Factor to the best method of a drive", { type: "log", ...ticks(factors) }),
+      yaxis: axis("Share of drives", { range: [0, 1.02], tickformat: ".0%" }),
+      legend: { orientation: "h", y: -0.2, yanchor: "top" },
+    }));
+    document.querySelectorAll(".critical").forEach((item) => { item.hidden = item.dataset.target !== byId("profile-target").value; });
+  };
+
   const drawers = new Map();
   const drawn = new Set();
   if (Object.keys(data.maps).length) {
@@ -316,6 +333,11 @@
     fill(byId("front-target"), Object.keys(data.fronts), targetWords);
     drawers.set("front-plot", drawFront);
     byId("front-target").addEventListener("change", drawFront);
+  }
+  if (Object.keys(data.profiles).length) {
+    fill(byId("profile-target"), Object.keys(data.profiles), targetWords);
+    drawers.set("profile-plot", drawProfile);
+    byId("profile-target").addEventListener("change", drawProfile);
   }
   const redraw = () => drawn.forEach((id) => drawers.get(id)());
   window.gripbenchReport = {
