@@ -13,6 +13,7 @@ from gripbench.bench.publishing.tables import Column, Table
 from gripbench.bench.publishing.timings import RelativeRuntime
 from gripbench.bench.ranking.answers import Answer
 from gripbench.bench.ranking.ranking import Board
+from gripbench.bench.ranking.resolution import resolution
 from gripbench.bench.ranking.skill import NO_BETTER
 from gripbench.bench.ranking.summary import FOOTNOTE, marked
 from gripbench.bench.scoring.metric import SIGNAL_UNIT, Metric
@@ -327,11 +328,17 @@ def _name(line: Mapping[Any, Any]) -> str:
 
 
 def _decimals(board: Board) -> str:
-    """Return the format in which the smallest RMS of a board has three digits."""
-    values = signal(board.target).display_factor * board.lines["rms"].to_numpy(float)
+    """Return the format in which the smallest RMS of a board has three digits.
+
+    No digit is shown that is beyond a tenth of what a reference instrument could tell.
+    """
+    factor = signal(board.target).display_factor
+    values = factor * board.lines["rms"].to_numpy(float)
     values = values[np.isfinite(values) & (values > 0.0)]
-    least = math.log10(values.min()) if len(values) else 0.0
-    return f".{min(max(0, 2 - math.floor(least)), 6)}f"
+    wanted = 2 - math.floor(math.log10(values.min())) if len(values) else 2
+    finest = factor * resolution(board.target)
+    most = math.ceil(-math.log10(finest)) + 1 if finest else 6
+    return f".{max(0, min(wanted, most))}f"
 
 
 def _percent(share: float) -> str | None:
