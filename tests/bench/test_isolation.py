@@ -10,7 +10,9 @@ import psutil
 import pytest
 
 import gripbench
+from gripbench.bench.catalogue.check import check_estimator, failures
 from gripbench.bench.catalogue.registry import choose_method
+from gripbench.bench.running import processes
 from gripbench.bench.running.sandbox import CellFailure, Limits, Sandbox
 from gripbench.errors import InputError
 
@@ -141,3 +143,60 @@ def _alive(pid: int) -> bool:
             return file.read().rsplit(")", 1)[1].split()[0] != "Z"
     except OSError:
         return False
+
+
+def _recorded(seconds=0.2):
+    scenario = gripbench.load_scenario("constant_mu").model_copy(update={"horizon": seconds})
+    return gripbench.record(scenario, 0)
+
+
+def test_without_forks(plugins, monkeypatch):
+    """The way of systems that cannot fork: one interpreter a cell, over its standard streams."""
+    monkeypatch.setattr(processes, "FORKS", False)
+    recording = _recorded()
+    sandbox = Sandbox(Limits())
+    declaration = sandbox.declare(choose_method(f"{plugins}/faulty.py:Sound").source, "", {})
+    found = []
+    for name in ("Sound", "Exits"):
+        source = choose_method(f"{plugins}/faulty.py:{name}").source
+        try:
+            outcome = sandbox.execute(
+                source, declaration, "", {}, recording.vehicle, recording.observations, 1e-3
+            )
+            found.append(float(outcome.estimates["mu_front"].max()))
+        except CellFailure as error:
+            found.append(str(error))
+    sandbox.close()
+    assert found == [0.5, "its process exited with code 0"]
+
+
+def test_nothing_beside_a_plugin_replaces_a_library(tmp_path, monkeypatch):
+    for name in ("random", "signal", "copy", "scipy", "numpy", "psutil"):
+        (tmp_path / f"{name}.py").write_text("raise RuntimeError('not the library')\n")
+    (tmp_path / "gripbench").mkdir()
+    (tmp_path / "gripbench" / "__init__.py").write_text("raise RuntimeError('not this one')\n")
+    (tmp_path / "own_module.py").write_text("VALUE = 0.5\n")
+    plugin = tmp_path / "mine.py"
+    plugin.write_text(
+        "import copy, random, signal, scipy, own_module, gripbench\n"
+        "class Mine:\n"
+        "    name, sensors, estimates = 'mine', ('accel_x',), ('mu_front',)\n"
+        "    def reset(self, vehicle, dt): pass\n"
+        "    def update(self, obs): return {'mu_front': own_module.VALUE}\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    spec, recording = choose_method("mine.py"), _recorded()
+    sandbox = Sandbox(Limits())
+    outcome = sandbox.execute(
+        spec.source, spec.declaration, "", {}, recording.vehicle, recording.observations, 1e-3
+    )
+    sandbox.close()
+    assert (outcome.estimates["mu_front"] == 0.5).all()
+
+
+def test_a_check_of_what_never_ends_ends(plugins):
+    found = check_estimator(f"{plugins}/faulty.py:Hangs", ("constant_mu",), limits=Limits(time=1.0))
+    assert found["declares_its_channels"] == "PASSED"
+    assert failures(found) == {
+        "reads_only_its_channels": "stopped after the time limit of 1 s",
+    }
