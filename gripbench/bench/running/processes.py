@@ -67,6 +67,7 @@ def environment() -> dict[str, str]:
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         kept.setdefault(name, "1")
     kept["PYTHONHASHSEED"] = "0"  # sets of texts have one order in every run
+    kept |= {"PYTHONUTF8": "1", "PYTHONCOERCECLOCALE": "0"}  # nor does the locale decide anything
     return kept
 
 
