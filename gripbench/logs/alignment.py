@@ -25,7 +25,7 @@ _CLEARER = 2e-4  # by which the best offset must correlate better than none
 _ALIKE = 3e-3  # peaks so near are equally good: the smallest offset counts
 _PARTS = 5
 _SMOOTH = 6.0  # s
-_LEAST = 0.05  # s
+_LEAST = 0.06  # s
 _LEAST_OF_LIKE = 0.25  # s, of sides that are alike only: slip or the sideslip's change comes in
 _CORRELATED_LIKE = 0.9
 _SLIDING = 0.1  # rad; at larger sideslip the sides that are alike are so no more
@@ -69,7 +69,7 @@ def lags(
         if strength <= best.get(key, 0.0):
             continue
         best[key] = strength
-        if abs(lag) > max(least, 3.0 * deviation):
+        if abs(lag) > max(least, 4.0 * deviation):
             found[key] = Lag(key, lag, deviation, against)
         else:
             found.pop(key, None)
