@@ -16,11 +16,11 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Literal, Self
 
-import numba
 import numpy as np
 import numpy.typing as npt
 from pydantic import Field, model_validator
 
+from gripbench.compilation import compiled
 from gripbench.configuration import CONFIGS, Configuration, parse, read_toml
 from gripbench.envs.signals import NEW, signal
 from gripbench.errors import InputError, nearest, unknown
@@ -239,7 +239,7 @@ _EVENT = np.dtype([(name, np.float64) for name in ("start", "end", "size", "slop
 _CLOCK = np.dtype([("late", np.int64), ("filled", np.int64)])
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _alter(op, state, events, time, value, inside):  # type: ignore[no-untyped-def]
     """Return a fresh reading as the fault leaves it, and whether it arrives."""
     if op.code == SPIKE:
@@ -265,7 +265,7 @@ def _alter(op, state, events, time, value, inside):  # type: ignore[no-untyped-d
     return value, False
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _act(k, row, window, ops, states, events, ring):  # type: ignore[no-untyped-def]
     time = row[0]
     inside = window[0] <= time < window[1]
@@ -297,7 +297,7 @@ def _act(k, row, window, ops, states, events, ring):  # type: ignore[no-untyped-
         row[op.column] = value
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def _apply(first, rows, window, ops, states, events, ring, jitter, swaps, clock, kept):  # type: ignore[no-untyped-def]
     for i in range(rows.shape[0]):
         row = rows[i]
