@@ -6,8 +6,10 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
+import psutil
 import pytest
 
 import gripbench
@@ -224,3 +226,68 @@ def _a_loky_worker():
                     if b"popen_loky" in command.read():
                         return int(child)
     raise AssertionError("no worker process found")
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_twenty_kills_between_rows_of_parent_and_workers_change_nothing(short_scenario, tmp_path):
+    seeds = 4000
+    run = ["run", "--scenario", short_scenario, "--method", "slip_slope", "--seeds", str(seeds)]
+    command = [sys.executable, "-m", "gripbench.bench.command_line", *run, "--workers", "2"]
+    results = tmp_path / "killed"
+    kept, kills = [], 0
+
+    def wait_for_a_row_after(count, process):
+        while sum(1 for _ in Store(results).files()) <= count:
+            assert process.poll() is None, process.stderr.read()
+            time.sleep(0.002)
+
+    for _ in range(10):
+        before = sum(1 for _ in Store(results).files())
+        with subprocess.Popen(
+            [*command, "--results", results], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+        ) as process:
+            wait_for_a_row_after(before, process)
+            workers = [
+                child
+                for child in psutil.Process(process.pid).children()
+                if "popen_loky" in " ".join(child.cmdline())
+            ]
+            workers[0].kill()
+            kept.append(sum(1 for _ in Store(results).files()))
+            wait_for_a_row_after(kept[-1], process)  # it goes on without that worker
+            process.kill()
+            kills += 2
+        kept.append(sum(1 for _ in Store(results).files()))
+    print(f"rows after each of {kills} kills: {kept}")
+    assert kills == 20
+    assert kept[0] > 0
+    assert kept == sorted(kept)
+    assert kept[-1] < seeds
+    arguments = {"scenarios": [short_scenario], "methods": ["slip_slope"], "seeds": seeds}
+    before = files(results)
+    after = gripbench.run(**arguments, results=results, workers=2)
+    assert before.items() <= files(results).items()
+    whole = gripbench.run(**arguments, results=tmp_path / "whole", workers=1)
+    assert scores_csv(after) == scores_csv(whole)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.name != "posix" or not shutil.which("unshare"), reason="needs unshare")
+def test_a_disk_that_is_really_full(short_scenario, tmp_path):
+    place = tmp_path / "small"
+    place.mkdir()
+    run = f"{sys.executable} -m gripbench.bench.command_line run --scenario {short_scenario}"
+    run += f" --method slip_slope --seeds 60 --workers 1 --results {place}"
+    script = f"""
+        mount -t tmpfs -o size=100k none {place} || exit 77
+        {run} >&2; echo $?
+        mount -o remount,size=4m {place}
+        {run} >&2; echo $?; find {place} -name '*.json' | wc -l
+    """
+    done = subprocess.run(["unshare", "-rm", "sh", "-c", script], capture_output=True, text=True)
+    if done.returncode == 77:
+        pytest.skip("no file system can be mounted here")
+    assert done.stdout.split() == ["2", "0", "60"], done.stderr
+    assert "cannot be written: the disk is full; make room" in done.stderr
+    assert "Traceback" not in done.stderr

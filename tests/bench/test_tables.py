@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from gripbench.bench.papers.comparison import portable
 from gripbench.bench.publishing import latex, tables
 from gripbench.bench.publishing.tables import Column, Table
 from gripbench.errors import InputError
@@ -178,3 +179,12 @@ def test_a_number_of_thousands_has_no_exponent():
     rows = tuple({"step": value} for value in (1163.0, 12.3, 2.5e9, 0.5))
     table = Table((column,), rows)
     assert [table.text(row, column) for row in range(4)] == ["1160", "12.3", "2.5e+09", "0.5"]
+
+
+def test_a_published_table_has_the_digits_that_every_machine_agrees_on():
+    column = (tables.Column("x", "X"), tables.Column("n", "N"), tables.Column("ok", "OK"))
+    here, there = (
+        tables.csv(portable(tables.Table(columns=column, rows=({"x": x, "n": 3, "ok": True},))))
+        for x in (39.704046023530594, 39.704046023530602)
+    )
+    assert here == there == "X,N,OK\n39.704,3,true\n"

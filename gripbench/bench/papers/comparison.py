@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import typer
@@ -61,11 +62,30 @@ def _make(directory: Path) -> None:
 
 def _write(directory: Path, result: Reproduction) -> None:
     for name, table in result.tables.items():
-        write_atomically(directory / f"{name}.csv", tables.csv(table))
+        write_atomically(directory / f"{name}.csv", tables.csv(portable(table)))
         write_atomically(directory / f"{name}.tex", tables.latex(table))
     text = "\n\n".join(tables.markdown(table) for table in result.tables.values())
     text += "\n\n" + "\n".join(f"- {line}" for line in result.lines) + "\n"
     write_atomically(directory / "README.md", text)
+
+
+def portable(table: tables.Table) -> tables.Table:
+    """Return a table with the digits of its numbers that are the same on every machine.
+
+    Processors round differently; a file that is published must come out again elsewhere.
+    """
+    rows = tuple(
+        {
+            key: float(f"{value:.{DIGITS}g}") if isinstance(value, float) else value
+            for key, value in row.items()
+        }
+        for row in table.rows
+    )
+    return replace(table, rows=rows)
+
+
+DIGITS = 6
+"""Significant digits of the numbers in published files."""
 
 
 def _progress() -> Progress:

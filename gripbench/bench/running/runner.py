@@ -33,7 +33,7 @@ CHUNK = 4
 """Seeds in a chunk of work, where no method runs isolated."""
 
 RETRIES = 3
-"""How often a run goes on after worker processes were lost."""
+"""How often a run goes on after worker processes were lost and no row came back."""
 
 
 @dataclass(frozen=True)
@@ -156,7 +156,7 @@ def run_plan(
                         on_row(store.marked(row))
                 break
             except WorkerLostError:
-                lost += 1
+                lost = 1 if done else lost + 1
                 if lost > RETRIES:
                     raise
                 # what came back is stored: only the rest runs again
