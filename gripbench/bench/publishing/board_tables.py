@@ -65,7 +65,8 @@ def _narrow(board: Board) -> tuple[Column, ...]:
             if board.guess
             else ()
         ),
-        Column("percent_next", "> next"),
+        # on the board of all methods what each reads takes its place
+        *((Column("percent_next", "> next"),) if board.sensors or not board.guess else ()),
     ]
     return tuple(columns)
 
