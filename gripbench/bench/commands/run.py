@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand
 
 from gripbench.bench.commands import RUN
 from gripbench.bench.running.store import DEFAULT_RESULTS
@@ -13,7 +14,20 @@ from gripbench.bench.running.store import DEFAULT_RESULTS
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
-    app.command("run", rich_help_panel=RUN)(run)
+    app.command("run", cls=_WithFaults, rich_help_panel=RUN)(run)
+
+
+class _WithFaults(TyperCommand):
+    """A command whose option `--faults` may stand without a value."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Give `--faults` the value `all` where none follows it."""
+        filled: list[str] = []
+        for word, following in zip(args, [*args[1:], "-"], strict=True):
+            filled.append(word)
+            if word == "--faults" and following.startswith("-"):
+                filled.append("all")
+        return super().parse_args(ctx, filled)
 
 
 def run(
@@ -46,6 +60,13 @@ def run(
             "default the suite's."
         ),
     ] = None,
+    faults: Annotated[
+        str,
+        typer.Option(
+            help="Also run with faults of the instruments: NAME:SEVERITY[:CHANNEL],..., a NAME for "
+            "all five severities; without a value every fault at severities 1, 3 and 5."
+        ),
+    ] = "",
     seeds: Annotated[
         str,
         typer.Option(
@@ -77,15 +98,18 @@ def run(
 ) -> None:
     """Run methods on scenarios and print their RMS errors; what is stored is not run again."""
     from gripbench.bench.catalogue.registry import load_suite
+    from gripbench.bench.publishing.degradation_table import print_degradation
     from gripbench.bench.publishing.presentation import (
         console,
         print_failures,
         print_summary,
         progress,
     )
+    from gripbench.bench.ranking.degradation import degradation
     from gripbench.bench.ranking.summary import scores_csv, summary
     from gripbench.bench.running.api import limits_of, order_in, plan_of
     from gripbench.bench.running.backends import Backend
+    from gripbench.bench.running.fault_plans import with_fault_scenarios
     from gripbench.bench.running.processes import choose_sandbox
     from gripbench.bench.running.recorded_scenarios import PREFIX
     from gripbench.bench.running.rows import Row, frame_of, untracked
@@ -99,6 +123,8 @@ def run(
         check_writable(export)
     chosen = [*(scenario or []), *(f"{PREFIX}{place}" for place in recording or [])]
     plan = plan_of(suite, chosen, method or [], seeds or None, level)
+    if faults:
+        plan = with_fault_scenarios(plan, faults)
     targets = load_suite(suite).targets if suite else ()
     rows: list[Row] = []
     with progress("running", plan.size) as bar:
@@ -122,6 +148,8 @@ def run(
     frame = frame_of(sorted(rows, key=order_in(plan)))
     shown = frame[frame["target"].isin([*targets, ""])] if targets else frame
     print_summary(summary(shown))
+    if faults:
+        print_degradation(degradation(shown))
     print_failures(frame)
     for label, words in untracked(rows).items():
         console().print(

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -83,6 +84,7 @@ def sensitivity(
         _print_radius(out, frame, spec.label, target)
     if len(specs) > 1:
         out.print(_breaking(study.breaking_table(frame), target))
+        out.print(_worst(study, frame, [spec.label for spec in specs], target))
     if export is not None:
         write_atomically(export, frame.to_csv(index=False, float_format="%.6g"))
 
@@ -170,15 +172,42 @@ def _print_radius(out, frame: pd.DataFrame, label: str, target: str) -> None:  #
 
 
 def _breaking(table: pd.DataFrame, target: str):  # type: ignore[no-untyped-def]
+    """Return the table method x cause: the six causes that break most methods first."""
     from rich.markup import escape
     from rich.table import Table
 
-    worst = table.min().sort_values(kind="stable").index[:6]
+    ahead = table[(table > 0.0).any(axis=1)]
+    worst = ahead.clip(upper=10.0).mean().sort_values(kind="stable").index[:6]
     shown = Table(
         "method", *worst,
         title=escape(f"{target}: breaking point over the range of the cause; -: beyond 4"),
     )  # fmt: skip
     for label, line in table[worst].iterrows():
+        behind = not (table.loc[label] > 0.0).any()
         cells = ["-" if not one < 1e9 else f"{one:.2f}" for one in line]
-        shown.add_row(str(label), *cells)
+        shown.add_row(str(label), *(["behind"] * len(worst) if behind else cells))
+    return shown
+
+
+def _worst(study: Any, frame: pd.DataFrame, labels: list[str], target: str):  # type: ignore[no-untyped-def]
+    """Return the table of each method's three causes that break it first."""
+    from rich.table import Table
+
+    shown = Table("method", "first", "second", "third", title=f"{target}: what breaks each first")
+    shares = study.breaking_table(frame)
+    for label in labels:
+        table = study.summary_of(frame, label).set_index("cause")
+        if table["nominal"].isna().all():
+            continue
+        order = shares.loc[label].sort_values(kind="stable")
+        if not (order > 0.0).any():
+            shown.add_row(label, "behind the best baseline without any error", "", "")
+            continue
+        cells = []
+        for cause in order[order < math.inf].index[:3]:
+            line = table.loc[cause]
+            ends = [line[side] for side in ("breaking_low", "breaking_high")]
+            nearest = min((one for one in ends if one == one), key=abs)
+            cells.append(f"{cause} {amount(nearest, line['unit'])}")
+        shown.add_row(label, *(cells + ["-"] * 3)[:3])
     return shown
