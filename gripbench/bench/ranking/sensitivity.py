@@ -245,7 +245,9 @@ def _measure(
             try:
                 recording = record(scenario, seed, changes={given.cause: given.at(size)})
             except InputError:
-                continue  # no car, or no drive, at this size
+                if abs(size) <= 1.0:
+                    raise  # a population's own range holds cars only
+                continue  # no car, or no drive, so far beyond it
         assert recording is not None
         for spec in specs:
             row = run_cell(cell_of(scenario, seed, spec, ""), recording, Limits(), timed=False)
