@@ -61,7 +61,7 @@ ROWS = {
     "looks_ahead": ("ok", ""),
     "reads_parent_memory": ("ok", ""),
     "reads_environment": ("ok", ""),
-    "memorises": ("ok", ""),
+    "memorises": ("failed", "a file of the method changed while it ran"),
     "reads_out_of_bounds": ("ok", ""),
     "batch_looks_ahead": ("ok", ""),
     "batch_of_texts": ("ok", ""),
@@ -147,8 +147,7 @@ def test_every_kind_gives_its_row(tmp_path):
     assert _wrong(rows, ROWS) == {}
     assert rows["reason"].str.len().max() <= 500
     sound = rows.loc[("sound", 0), "rms"]
-    for cheat in ("knows_seed", "looks_ahead", "reads_parent_memory", "reads_environment",
-                  "memorises"):  # fmt: skip
+    for cheat in ("knows_seed", "looks_ahead", "reads_parent_memory", "reads_environment"):  # fmt: skip
         assert rows.loc[(cheat, 0), "rms"] == sound, cheat
     assert not Path("/tmp/gripbench_was_here").exists()
     assert not [

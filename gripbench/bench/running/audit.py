@@ -18,7 +18,7 @@ import stat
 import sys
 import sysconfig
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -31,10 +31,10 @@ MOST = 500
 """Most things whose digests a report holds; who reads more is not followed."""
 
 
-def digest_of(kind: str, name: str) -> str:
+def digest_of(kind: str, name: str, environment: Mapping[str, str] = os.environ) -> str:
     """Return the digest of what is there now under a reported kind and name."""
     if kind == "environment":
-        value = os.environ.get(name)
+        value = environment.get(name)
         return ABSENT if value is None else _digest(value.encode("utf-8", "surrogateescape"))
     try:
         if kind == "folder":

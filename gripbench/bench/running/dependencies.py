@@ -52,7 +52,7 @@ def unchanged(dependencies: Mapping[str, str], folder: Path) -> bool:
         if kind == "environment":
             if name in os.environ and name not in environment():
                 return False  # it would have to say that no method is given it
-            found = digest_of(kind, name)
+            found = digest_of(kind, name, environment())  # what a method is given
         else:
             found = _digest_now(kind, str(folder / Path(name).expanduser()))
         if found != digest:

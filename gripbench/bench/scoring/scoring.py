@@ -156,6 +156,8 @@ def check_estimates(estimates: Any, outputs: tuple[str, ...], length: int) -> No
             f"estimates are {type(estimates).__name__}, not a structured array with the fields "
             f"{', '.join(outputs)}"
         )
+    if isinstance(estimates, np.ma.MaskedArray):
+        raise EstimateError("estimates are a masked array; return a plain one")
     missing = [name for name in outputs if name not in names]
     if missing:
         raise EstimateError(f"the estimate '{missing[0]}' is declared but not given")
