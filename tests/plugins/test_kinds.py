@@ -147,7 +147,7 @@ def test_every_kind_gives_its_row(tmp_path):
     assert _wrong(rows, ROWS) == {}
     assert rows["reason"].str.len().max() <= 500
     sound = rows.loc[("sound", 0), "rms"]
-    for cheat in ("knows_seed", "looks_ahead", "reads_parent_memory", "reads_environment"):  # fmt: skip
+    for cheat in ("knows_seed", "looks_ahead", "reads_parent_memory", "reads_environment"):
         assert rows.loc[(cheat, 0), "rms"] == sound, cheat
     assert not Path("/tmp/gripbench_was_here").exists()
     assert not [
