@@ -6,7 +6,7 @@ that are missing are held as inputs and left out as measurements.
 
 from __future__ import annotations
 
-from math import atan2
+from math import atan2, exp, log
 
 import numpy as np
 
@@ -50,6 +50,16 @@ NOISE_PARAMETERS = (
 """Noise levels of the single-track filters."""
 
 FUSED_PARAMETERS = (*NOISE_PARAMETERS, *SPEED_PARAMETERS)
+
+ADAPTIVE_PARAMETERS = (
+    *FUSED_PARAMETERS,
+    Parameter("stiffness_std", 0.15, "-", "Relative error of the stiffness", 1e-3, 1.0),
+    Parameter("stiffness_walk", 0.02, "1/sqrt(s)", "Walk of its logarithm", 0.0, 1.0),
+    Parameter("friction_mean", 0.5, "-", "Friction at the start", 0.05, 1.4),
+    Parameter("friction_std", 0.5, "-", "Standard deviation of its logarithm", 0.01, 3.0),
+    Parameter("friction_walk", 0.1, "1/sqrt(s)", "Walk of its logarithm", 0.0, 3.0),
+)
+"""Parameters of the filters that adapt stiffness and friction."""
 
 
 @compiled
@@ -99,3 +109,19 @@ def write_lateral(inputs, speed_y, yaw_rate, variance, est):  # type: ignore[no-
 
 LATERAL_ESTIMATES = ("sideslip", "speed_y", "yaw_rate")
 LATERAL_VARIANCES = ("sideslip", "speed_y")
+
+
+@compiled
+def start_adaptive(x, P, first, params):  # type: ignore[no-untyped-def]
+    """Set ln C_f, ln C_r and ln mu, from state `first` on."""
+    x[first + 2] = log(params.friction_mean)
+    P[first, first] = P[first + 1, first + 1] = params.stiffness_std**2
+    P[first + 2, first + 2] = params.friction_std**2
+
+
+@compiled
+def write_friction(logarithm, variance, est):  # type: ignore[no-untyped-def]
+    """Write mean and variance of the friction from those of its logarithm (log-normal)."""
+    spread = min(variance, 1.0)
+    est.mu = exp(min(logarithm + 0.5 * spread, 0.5))
+    est.mu_variance = est.mu * est.mu * (exp(spread) - 1.0)

@@ -1,0 +1,121 @@
+"""Dual extended Kalman filter: one filter for the states, one for stiffness and friction.
+
+Wenzel, Burnham, Blundell & Williams (2006), Dual extended Kalman filter for vehicle state and
+parameter estimation, Vehicle System Dynamics 44: in each step the parameter filter predicts, the
+state filter predicts and is corrected with those parameters, and the parameter filter is corrected
+by the same measurement of a_y with the new states. The cross covariance of states and parameters
+is left out, as in the paper; `joint_ekf` keeps it.
+"""
+
+from __future__ import annotations
+
+from math import log
+
+import numpy as np
+
+from gripbench.methods.blocks.kalman import correct_scalar, filter_type
+from gripbench.methods.blocks.single_track import SINGLE_TRACK_VEHICLE
+from gripbench.methods.blocks.single_track_ekf import (
+    correct_track,
+    evaluate_track,
+    predict_track,
+)
+from gripbench.methods.blocks.single_track_filter import (
+    ADAPTIVE_PARAMETERS,
+    FUSED_SENSORS,
+    FUSED_VEHICLE,
+    GPS_SENSORS,
+    INPUT_STATE,
+    LATERAL_ESTIMATES,
+    LATERAL_VARIANCES,
+    MEASURED_SENSORS,
+    read_fused,
+    read_gps,
+    read_measured,
+    start_adaptive,
+    write_friction,
+    write_lateral,
+)
+from gripbench.methods.contract import CompiledMethod, Variant, compiled
+
+_STATE = np.dtype(
+    [
+        ("inputs", INPUT_STATE),
+        ("filter", filter_type(5)),  # states, with the parameters held as known
+        ("parameter", filter_type(3)),
+        ("motion", np.float64, (2, 7)),
+    ]
+)
+
+
+@compiled
+def _advance(state, obs, params, est):  # type: ignore[no-untyped-def]
+    filter, parameter, inputs = state.filter, state.parameter, state.inputs
+    x, P, y, h = filter.x, filter.P, parameter.x, parameter.h
+    span = obs.elapsed
+    if obs.first:
+        P[0, 0], P[1, 1], x[1] = params.speed_y_std**2, 1.0, obs.yaw_rate
+        start_adaptive(y, parameter.P, 0, params)
+        for i in range(3):
+            x[2 + i] = y[i]
+    elif span > 0.0:
+        parameter.P[0, 0] += params.stiffness_walk**2 * span
+        parameter.P[1, 1] += params.stiffness_walk**2 * span
+        parameter.P[2, 2] += params.friction_walk**2 * span
+        predict_track(filter, span, inputs.speed, inputs.steer, 0.0, params, state.motion)
+        correct_track(
+            filter, span, inputs.speed, inputs.steer, 0.0, obs.yaw_rate, obs.accel_y, params,
+            state.motion,
+        )  # fmt: skip
+        out = state.motion
+        evaluate_track(x, inputs.speed, inputs.steer, 0.0, params, out)
+        h[0], h[1], h[2] = out[0, 4], out[0, 5], out[0, 3]
+        noise = params.accel_y_noise**2 / span + out[0, 1] ** 2 * P[0, 0]
+        correct_scalar(parameter, obs.accel_y - out[0, 0], noise)
+        y[0], y[1] = min(max(y[0], -1.0), 1.0), min(max(y[1], -1.0), 1.0)
+        y[2] = min(max(y[2], log(0.05)), log(1.4))
+        for i in range(3):
+            x[2 + i] = y[i]
+    write_lateral(inputs, x[0], x[1], P[0, 0], est)
+    write_friction(y[2], parameter.P[2, 2], est)
+
+
+@compiled
+def _step(state, obs, params, est):  # type: ignore[no-untyped-def]
+    read_fused(state.inputs, obs, params)
+    _advance(state, obs, params, est)
+
+
+@compiled
+def _step_measured(state, obs, params, est):  # type: ignore[no-untyped-def]
+    read_measured(state.inputs, obs, params)
+    _advance(state, obs, params, est)
+
+
+@compiled
+def _step_gps(state, obs, params, est):  # type: ignore[no-untyped-def]
+    read_gps(state.inputs, obs, params)
+    _advance(state, obs, params, est)
+
+
+class DualEkf(CompiledMethod):
+    """A filter for the states beside one for stiffness and friction."""
+
+    name = "dual_ekf"
+    title = "Dual EKF"
+    reference = "Wenzel, Burnham, Blundell & Williams (2006)"
+    sensors = FUSED_SENSORS
+    estimates = (*LATERAL_ESTIMATES, "mu")
+    variances = (*LATERAL_VARIANCES, "mu")
+    vehicle_parameters = FUSED_VEHICLE
+    parameters = ADAPTIVE_PARAMETERS
+    variants = {
+        "measured_speed": Variant(
+            sensors=MEASURED_SENSORS, step=_step_measured, vehicle_parameters=SINGLE_TRACK_VEHICLE
+        ),
+        "gps_speed": Variant(
+            sensors=GPS_SENSORS, step=_step_gps, vehicle_parameters=SINGLE_TRACK_VEHICLE
+        ),
+    }
+    state = _STATE
+    step = staticmethod(_step)

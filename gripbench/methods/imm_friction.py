@@ -1,0 +1,130 @@
+"""Interacting multiple models over classes of friction: ice, snow, wet and dry road.
+
+Each class has the single-track filter with brush tyres of its friction; the classes are Markovian
+and weigh by the likelihood of yaw rate and a_y (Blom & Bar-Shalom 1988; of friction in the form of
+Tsunashima, Murakami & Miyata (2006), Vehicle and road state estimation using interacting multiple
+model approach, Vehicle System Dynamics 44).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gripbench.methods.blocks.hypotheses import (
+    bank_type,
+    mix,
+    moments,
+    put,
+    score_of,
+    take,
+    weigh,
+)
+from gripbench.methods.blocks.kalman import filter_type
+from gripbench.methods.blocks.single_track import SINGLE_TRACK_VEHICLE
+from gripbench.methods.blocks.single_track_ekf import correct_track, predict_track
+from gripbench.methods.blocks.single_track_filter import (
+    FUSED_PARAMETERS,
+    FUSED_SENSORS,
+    FUSED_VEHICLE,
+    GPS_SENSORS,
+    INPUT_STATE,
+    LATERAL_ESTIMATES,
+    LATERAL_VARIANCES,
+    MEASURED_SENSORS,
+    read_fused,
+    read_gps,
+    read_measured,
+    write_lateral,
+)
+from gripbench.methods.contract import CompiledMethod, Parameter, Variant, compiled
+
+FRICTION = (0.15, 0.3, 0.55, 0.9)
+"""Friction of ice, snow, wet and dry road."""
+
+_K = len(FRICTION)
+_STATE = np.dtype(
+    [
+        ("inputs", INPUT_STATE),
+        ("filter", filter_type(2)),
+        ("bank", bank_type(_K, 2)),
+        ("motion", np.float64, (2, 7)),
+    ]
+)
+
+
+@compiled
+def _advance(state, obs, params, est):  # type: ignore[no-untyped-def]
+    filter, inputs, bank = state.filter, state.inputs, state.bank
+    span = obs.elapsed
+    if obs.first:
+        for j in range(_K):
+            bank.prior[j] = bank.weight[j] = 1.0 / _K
+            bank.x[j, 1] = obs.yaw_rate
+            bank.P[j, 0, 0], bank.P[j, 1, 1] = params.speed_y_std**2, 1.0
+    elif span > 0.0:
+        mix(bank, -np.expm1(-params.change_rate * span))
+        for j in range(_K):
+            take(bank, j, filter)
+            predict_track(
+                filter, span, inputs.speed, inputs.steer, FRICTION[j], params, state.motion
+            )
+            rate, rate_spread, accel, accel_spread = correct_track(
+                filter, span, inputs.speed, inputs.steer, FRICTION[j], obs.yaw_rate, obs.accel_y,
+                params, state.motion,
+            )  # fmt: skip
+            bank.score[j] = score_of(rate, rate_spread) + score_of(accel, accel_spread)
+            put(bank, j, filter)
+        weigh(bank)
+    speed_y, variance = moments(bank, 0)
+    write_lateral(inputs, speed_y, moments(bank, 1)[0], variance, est)
+    mean, square = 0.0, 0.0
+    for j in range(_K):
+        mean += bank.weight[j] * FRICTION[j]
+        square += bank.weight[j] * FRICTION[j] ** 2
+    est.mu = mean
+    est.mu_variance = square - mean * mean + params.class_error**2
+
+
+@compiled
+def _step(state, obs, params, est):  # type: ignore[no-untyped-def]
+    read_fused(state.inputs, obs, params)
+    _advance(state, obs, params, est)
+
+
+@compiled
+def _step_measured(state, obs, params, est):  # type: ignore[no-untyped-def]
+    read_measured(state.inputs, obs, params)
+    _advance(state, obs, params, est)
+
+
+@compiled
+def _step_gps(state, obs, params, est):  # type: ignore[no-untyped-def]
+    read_gps(state.inputs, obs, params)
+    _advance(state, obs, params, est)
+
+
+class ImmFriction(CompiledMethod):
+    """Single-track filters on ice, snow, wet and dry road, weighed."""
+
+    name = "imm_friction"
+    title = "IMM over friction classes"
+    reference = "Blom & Bar-Shalom (1988); Tsunashima, Murakami & Miyata (2006)"
+    sensors = FUSED_SENSORS
+    estimates = (*LATERAL_ESTIMATES, "mu")
+    variances = (*LATERAL_VARIANCES, "mu")
+    vehicle_parameters = FUSED_VEHICLE
+    parameters = (
+        *FUSED_PARAMETERS,
+        Parameter("change_rate", 0.1, "1/s", "Rate at which the friction changes", 1e-4, 10.0),
+        Parameter("class_error", 0.1, "-", "Error of a class's friction", 1e-3, 1.0),
+    )
+    variants = {
+        "measured_speed": Variant(
+            sensors=MEASURED_SENSORS, step=_step_measured, vehicle_parameters=SINGLE_TRACK_VEHICLE
+        ),
+        "gps_speed": Variant(
+            sensors=GPS_SENSORS, step=_step_gps, vehicle_parameters=SINGLE_TRACK_VEHICLE
+        ),
+    }
+    state = _STATE
+    step = staticmethod(_step)
