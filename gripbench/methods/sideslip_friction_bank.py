@@ -333,9 +333,9 @@ class SideslipFrictionBank(CompiledMethod):
     )
     parameters = (
         *SPEED_PARAMETERS,
-        Parameter("friction_mean", 0.5, "-", "Mean of the friction before the drive", 0.1, 1.2),
-        Parameter("friction_spread", 0.5, "-", "Its standard deviation", 0.02, 2.0),
-        Parameter("change_rate", 0.1, "1/s", "Rate at which the friction changes", 1e-4, 5.0),
+        Parameter("friction_mean", 0.45, "-", "Mean of the friction before the drive", 0.1, 1.2),
+        Parameter("friction_spread", 0.35, "-", "Its standard deviation", 0.02, 2.0),
+        Parameter("change_rate", 0.03, "1/s", "Rate at which the friction changes", 1e-4, 5.0),
         Parameter("class_width", 0.4, "-", "Standard deviation of ln mu in a class", 0.05, 2.0),
         Parameter("class_time", 2.0, "s", "Time in which ln mu returns to its class", 0.05, 60.0),
         Parameter("window_time", 0.01, "s", "Samples of this time are taken as one", 1e-3, 0.1),
