@@ -288,11 +288,11 @@ def interval(
     estimate: Floats, errors: Floats, runs: int, confidence: float = CONFIDENCE
 ) -> tuple[Floats, Floats]:
     """Return the ends of Student's interval, NaN without two runs."""
-    from scipy.special import stdtrit
-
     if runs < 2:
         nothing = np.full(len(estimate), np.nan)
         return nothing, nothing
+    from scipy.special import stdtrit  # slow to import
+
     width = stdtrit(runs - 1, 0.5 + confidence / 2.0) * errors
     return estimate - width, estimate + width
 
@@ -330,8 +330,6 @@ def pooled_rms_interval(
     runs seldom show, so each leaves out two thirds of the share that it might: `tests/bench/
     interval_coverage.py` prints the coverage of the result, at least 93 % from ten runs on.
     """
-    from scipy.special import chdtri, stdtrit
-
     squares, number = np.asarray(sums_of_squares, float), np.asarray(counts, float)
     runs = len(squares)
     if runs < FEWEST_RUNS:
@@ -339,6 +337,8 @@ def pooled_rms_interval(
     mean = squares.sum() / number.sum()
     if np.ptp(squares / number) <= INDISTINGUISHABLE * np.max(squares / number):
         return math.sqrt(mean), math.sqrt(mean)  # every resample gives it: nothing to draw
+    from scipy.special import chdtri, stdtrit  # slow to import
+
     tail = (1.0 - confidence) / 3.0
     error = float(_relative_errors(np.ones((1, runs)), squares, number)[0])
     drawn = draws(runs, resamples, seed)

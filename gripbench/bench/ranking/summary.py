@@ -31,7 +31,7 @@ def summary(rows: pd.DataFrame) -> pd.DataFrame:
     -------
     Frame with the columns `scenario, target, label, idealised, runs, ok, status, rms, low, high`:
     `rms` is pooled over the runs that are `ok` by the mean of squares, `low` and `high` bound its
-    95 % interval (BCa bootstrap over runs, never over samples), `status` counts the others.
+    95 % interval (over runs, see `statistics.pooled_rms_interval`), `status` counts the others.
     For the available friction also, over the runs that are excited, `excited, excited_rms,
     excited_low, excited_high` (number of these runs, RMS from the first excitation on), `settled,
     delay, delay_low, delay_high` (number of runs that settle, mean of their delays [s]) and, where

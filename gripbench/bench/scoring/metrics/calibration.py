@@ -16,7 +16,6 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from scipy.special import ndtr, ndtri
 
 from gripbench.bench.scoring.metric import Context, Floats, Metric, running_total
 
@@ -42,6 +41,8 @@ def crps(
     deviation = context.deviation
     if deviation is None:
         return None
+    from scipy.special import ndtr
+
     z = np.abs(estimate - truth) / deviation
     density = np.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi)
     scores = deviation * (z * (2.0 * ndtr(z) - 1.0) + 2.0 * density - 1.0 / math.sqrt(math.pi))
@@ -54,18 +55,23 @@ def width(
     """Return the sum of the widths of the stated 90 % intervals, and the samples."""
     if context.deviation is None:
         return None
-    return 2.0 * float(ndtri(0.95)) * running_total(context.deviation), len(truth)
+    return 2.0 * _quantile(0.95) * running_total(context.deviation), len(truth)
+
+
+def _quantile(probability: float) -> float:
+    from scipy.special import ndtri  # slow to import, and few methods state a variance
+
+    return float(ndtri(probability))
 
 
 def _coverage(level: float) -> Callable[..., tuple[float, int] | None]:
-    reach = float(ndtri(0.5 + level / 2.0))
-
     def covered(
         time: Floats, estimate: Floats, truth: Floats, context: Context
     ) -> tuple[float, int] | None:
         """Return how many samples lie within their stated interval, and all of them."""
         if context.deviation is None:
             return None
+        reach = _quantile(0.5 + level / 2.0)
         inside = np.abs(estimate - truth) <= reach * context.deviation
         return float(np.count_nonzero(inside)), len(truth)
 
