@@ -165,6 +165,31 @@ def test_command_prints_and_writes(quick, tmp_path):
     assert manifest["seeds"] == {"li2014_constant_mu": [0], "li2014_gradient": [0]}
     assert {"configuration", "versions", "commit", "machine", "date"} <= set(manifest)
     assert "†" in (folder / "README.md").read_text()
+    assert "* best of its group" in done.output
+
+
+def test_a_rerun_that_changes_nothing_changes_no_file(quick, tmp_path, monkeypatch):
+    arguments = ["reproduce", "li2014", "--results", str(tmp_path)]
+    folder = tmp_path / "li2014"
+
+    def content():
+        assert CliRunner().invoke(application(), arguments).exit_code == 0
+        return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+    first = content()
+    monkeypatch.setattr("gripbench.bench.publishing.manifest.commit", lambda: "another")
+    assert content() == first
+    (folder / "table_iv.csv").write_text("edited by hand")
+    assert content() == first
+    known = json.loads(first["manifest.json"])
+    known["files"]["table_iv.csv"] = "of other figures"
+    (folder / "manifest.json").write_text(json.dumps(known))
+    last = content()
+    assert json.loads(last.pop("manifest.json"))["commit"] == "another"
+    first.pop("manifest.json")
+    assert last == first
+    (folder / "manifest.json").write_text("[")
+    assert json.loads(content()["manifest.json"])["commit"] == "another"
 
 
 def test_a_changed_cell_is_exit_code_1(quick, tmp_path, monkeypatch):

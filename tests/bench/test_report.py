@@ -186,6 +186,24 @@ def test_the_page_shows_failures_papers_and_manifests(report):
     assert "&quot;commit&quot;: &quot;abc&quot;" in report
 
 
+def test_an_absent_recording_is_a_note_and_no_failure(tmp_path):
+    reason = "log.csv is not at hand; get it from <somewhere>"
+    rows = noisy_rows({"good": 1.0, "bad": 3.0}, seeds=2)
+    rows += [
+        row(label, 0, None, "recording:x", status="skipped", reason=reason, targets=())
+        for label in ("good", "bad")
+    ]
+    made = page.page(frame_of(rows), ("mu_front",), {}, tmp_path)
+    failures = made.partition('<section id="failures">')[2].partition("</section>")[0]
+    assert "Every run finished." in failures
+    assert "Note: recording:x was not run: log.csv is not at hand; get it from &lt;" in failures
+    assert "<dt>Runs</dt><dd>8</dd>" in made
+    rows += [row("good", 1, None, "recording:x", status="failed")]
+    made = page.page(frame_of(rows), ("mu_front",), {}, tmp_path)
+    assert "Note: recording:x" not in made
+    assert "Every run finished." not in made
+
+
 def test_the_data_are_plain_json_without_a_closing_tag(report):
     text = re.search(r'<script type="application/json" id="data">(.*?)</script>', report)[1]
     data = json.loads(text)

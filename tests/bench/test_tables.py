@@ -110,6 +110,7 @@ def test_html_reads_back_with_values_to_sort_by(table):
 def test_plain_text_is_aligned_and_marks_the_best(table):
     lines = tables.plain(table).splitlines()
     assert lines[0] == table.caption
+    assert lines[-3] == "* best of its group"
     assert lines[-1] == "Second note: a < b."
     assert lines[4].split()[-3:] == ["1.23*", "50.0*", "3"]
     right_edges = {line.index(text) + len(text) for line, text in zip(

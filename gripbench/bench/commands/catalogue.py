@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable, Sequence
 from enum import StrEnum
 from typing import Annotated
 
@@ -41,16 +42,9 @@ def _methods() -> None:
 
 def list_kind(kind: Annotated[Kind, typer.Argument(help="What to list.")]) -> None:
     """List scenarios, methods, vehicles, populations, causes, instruments..."""
-    from rich.table import Table
-
     from gripbench.bench.catalogue.listing import listing
-    from gripbench.bench.publishing.presentation import console
 
-    header, lines = listing(kind.value)
-    table = Table(*header)
-    for line in lines:
-        table.add_row(*line)
-    console().print(table)
+    _print(*listing(kind.value))
 
 
 def show(
@@ -70,13 +64,18 @@ def methods_table(
     ] = False,
 ) -> None:
     """Print which sensors each method needs: Table I of Li, Du & Li (2014), from the code."""
+    from gripbench.bench.catalogue.listing import sensor_needs
+
+    _print(*sensor_needs(target, everything))
+
+
+def _print(header: Sequence[str], lines: Iterable[Sequence[str]]) -> None:
+    """Print a table, and below it what its mark means where it has one."""
     from rich.table import Table
 
-    from gripbench.bench.catalogue.listing import sensor_needs
     from gripbench.bench.publishing.presentation import console
     from gripbench.bench.ranking.summary import FOOTNOTE, MARK
 
-    header, lines = sensor_needs(target, everything)
     table = Table(*header)
     for line in lines:
         table.add_row(*line)

@@ -88,10 +88,10 @@ def publish(
     rows = rows_of_suites(read_rows(results), suites)
     rows = rows[rows["seed"] < seeds]
     targets = chosen_targets(rows, suites)
-    write(results, *build(rows, runtimes, CONFIDENCE, targets))
+    files = write(results, *build(rows, runtimes, CONFIDENCE, targets))
     say("leaderboard" if runtimes else "leaderboard, without runtimes: give --timings")
     configuration = {name: load_suite(name).model_dump(mode="json") for name in suites}
-    write_manifest(results, manifest(configuration, dict.fromkeys(suites, seeds)))
+    write_manifest(results, manifest(configuration, dict.fromkeys(suites, seeds)), files)
     write_report(results, results / "report.html", suites, workers=backend.processes)
     say("report")
     for line in changed:

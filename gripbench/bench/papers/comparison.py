@@ -47,8 +47,8 @@ def reproduce_paper(paper: str, directory: Path) -> list[str]:
     for table in result.tables.values():
         tables.show(table)
     typer.echo("\n".join(result.lines))
-    _write(directory, result)
-    write_manifest(directory, manifest(result.configuration, result.seeds))
+    files = _write(directory, result)
+    write_manifest(directory, manifest(result.configuration, result.seeds), files)
     return result.changed
 
 
@@ -60,13 +60,16 @@ def _make(directory: Path) -> None:
         raise GripbenchError(f"{directory}: cannot be written ({error.strerror})") from None
 
 
-def _write(directory: Path, result: Reproduction) -> None:
+def _write(directory: Path, result: Reproduction) -> list[Path]:
+    content = {}
     for name, table in result.tables.items():
-        write_atomically(directory / f"{name}.csv", tables.csv(portable(table)))
-        write_atomically(directory / f"{name}.tex", tables.latex(table))
+        content[f"{name}.csv"] = tables.csv(portable(table))
+        content[f"{name}.tex"] = tables.latex(table)
     text = "\n\n".join(tables.markdown(table) for table in result.tables.values())
-    text += "\n\n" + "\n".join(f"- {line}" for line in result.lines) + "\n"
-    write_atomically(directory / "README.md", text)
+    content["README.md"] = text + "\n\n" + "\n".join(f"- {line}" for line in result.lines) + "\n"
+    for name, written in content.items():
+        write_atomically(directory / name, written)
+    return [directory / name for name in content]
 
 
 def portable(table: tables.Table) -> tables.Table:

@@ -1,14 +1,15 @@
-"""The manifest: what made a set of results, so that it can be made again."""
+"""What was run and the files that came of it in; out, a manifest, by which to make them again."""
 
 from __future__ import annotations
 
 import datetime
+import hashlib
 import importlib.metadata
 import json
 import os
 import platform
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -42,11 +43,49 @@ def manifest(configuration: Mapping[str, Any], seeds: Mapping[str, Any]) -> dict
     }
 
 
-def write_manifest(directory: Path, content: Mapping[str, Any]) -> Path:
-    """Write a manifest as JSON into a directory; return its path."""
+def write_manifest(directory: Path, content: Mapping[str, Any], files: Iterable[Path]) -> Path:
+    """Write a manifest as JSON into a directory, unless the one there is about the same results.
+
+    Parameters
+    ----------
+    directory
+        Where it goes, as `manifest.json`.
+    content
+        As `manifest` returns it.
+    files
+        The files in the directory that were made; the manifest holds their digests (SHA-256).
+
+    Returns
+    -------
+    Its path.
+
+    Notes
+    -----
+    A manifest of the same configuration, seeds and files stays: it says when, where and by which
+    commit these results were made first, and a rerun that changes nothing changes no file.
+    """
     path = directory / "manifest.json"
-    write_atomically(path, json.dumps(content, indent=2, sort_keys=True) + "\n")
+    digests = {
+        file.relative_to(directory).as_posix(): hashlib.sha256(file.read_bytes()).hexdigest()
+        for file in files
+    }
+    text = json.dumps({**content, "files": digests}, indent=2, sort_keys=True) + "\n"
+    if _about(json.loads(text)) != _about(_read(path)):
+        write_atomically(path, text)
     return path
+
+
+def _about(content: Any) -> list[Any] | None:
+    if not isinstance(content, dict):
+        return None
+    return [content.get(key) for key in ("configuration", "seeds", "files")]
+
+
+def _read(path: Path) -> Any:
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None  # none there, or spoilt: it is written anew
 
 
 def commit() -> str:

@@ -225,7 +225,9 @@ def plain(table: Table) -> str:
     ]
     lines.insert(1, "  ".join("-" * width for width in widths))
     head = [table.caption, ""] if table.caption else []
-    tail = ["", *table.notes] if table.notes else []
+    within = "group" if len(table.groups) > 1 else "column"
+    notes = [*([f"* best of its {within}"] if best else []), *table.notes]
+    tail = ["", *notes] if notes else []
     return "\n".join([*head, *lines, *tail]) + "\n"
 
 

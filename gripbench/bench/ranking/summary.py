@@ -113,6 +113,18 @@ def marked(label: str, idealised: str | tuple[str, ...]) -> str:
     return label + MARK if idealised else label
 
 
+def not_run(rows: pd.DataFrame) -> dict[str, str]:
+    """Return the scenarios in which no method ran for one and the same reason, with the reason.
+
+    So are recordings of which no file is at hand: that says nothing of any method.
+    """
+    found = {}
+    for scenario, part in rows.groupby("scenario", sort=False):
+        if (part["status"] == "skipped").all() and part["reason"].nunique() == 1:
+            found[str(scenario)] = str(part["reason"].iloc[0])
+    return found
+
+
 def failures(rows: pd.DataFrame) -> pd.DataFrame:
     """Return what is not `ok`: one line for each scenario, method, status and reason."""
     bad = rows[rows["status"] != "ok"].drop_duplicates(["scenario", "label", "seed"])

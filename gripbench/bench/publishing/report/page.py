@@ -37,6 +37,7 @@ from gripbench.bench.publishing.report.critical import critical_differences
 from gripbench.bench.publishing.report.series import POINTS, SeriesPlan, all_series
 from gripbench.bench.ranking.answers import answers
 from gripbench.bench.ranking.plans import plan_of
+from gripbench.bench.ranking.summary import not_run
 from gripbench.bench.running.recorded_scenarios import at_hand
 from gripbench.bench.running.store import read_rows
 from gripbench.errors import InputError
@@ -150,6 +151,9 @@ def page(
     results
         Folder in which reproductions and manifests are looked for.
     """
+    absent = not_run(rows)
+    if len(absent) < rows["scenario"].nunique():
+        rows = rows[~rows["scenario"].isin(absent)]
     found = found_boards(rows, targets)
     whole = {board.target: board for board in found if not board.sensors}
     data = {
@@ -177,7 +181,7 @@ def page(
         "boards": "\n".join(_board(board) for board in found),
         "critical": "\n".join(critical_differences(board) for board in whole.values()),
         "papers": _papers(paper_results(results)),
-        "failures": _failures(rows),
+        "failures": _failures(rows) + _notes(absent),
         "manifest": _manifest(manifests(results)),
         "footer": html.escape(f"gripbench {gripbench.__version__}, commit {commit()}, {today()}"),
         "points": str(POINTS),
@@ -289,6 +293,14 @@ def _failures(rows: pd.DataFrame) -> str:
         "lacks a sensor or a vehicle parameter that the method needs.</p>"
         '<div class="scroll" tabindex="0" role="region" aria-label="Failures">'
         f"{tables.html(table)}</div>"
+    )
+
+
+def _notes(absent: Mapping[str, str]) -> str:
+    """Return what was not run at all, say for want of a recording's files: no method failed."""
+    return "".join(
+        f'<p class="note">Note: {html.escape(scenario)} was not run: {html.escape(reason)}.</p>'
+        for scenario, reason in absent.items()
     )
 
 
