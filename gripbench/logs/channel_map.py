@@ -51,6 +51,7 @@ from gripbench.logs.map_tables import (
     Name,
     Sensor,
     TimeColumn,
+    Windows,
     convertible,
 )
 
@@ -99,14 +100,14 @@ class ChannelMap(Configuration):
     bounds
         Intervals in which a signal is known to lie, by signal name.
     windows
-        Named lists of intervals [s]: `train`, `test` and others. A score is taken over `test`
-        where there is one.
+        Named lists of intervals [s] of the log's own clock: `train`, `test` and others. A score is
+        taken over `test` where there is one.
     settings
         Parameters of methods, by method, that belong to the place or the vehicle (the earth's
         field, the speed from which a small car's tyres tell something) or were tuned on the
         training windows.
     score_from
-        Samples before this time [s] do not count in any score.
+        Samples of the first so many seconds do not count in any score.
     """
 
     name: str = Field(pattern=r"^[a-z][a-z0-9_]*$")
@@ -136,7 +137,7 @@ class ChannelMap(Configuration):
     reference: dict[str, Column] = Field(default_factory=dict)
     derived: Derived = Derived()
     bounds: dict[str, tuple[Bound, ...]] = Field(default_factory=dict)
-    windows: dict[str, tuple[tuple[float, float], ...]] = Field(default_factory=dict)
+    windows: Windows = Windows()
     settings: dict[str, dict[str, float]] = Field(default_factory=dict)
     score_from: float = Field(default=0.0, ge=0.0)
 
@@ -158,17 +159,6 @@ class ChannelMap(Configuration):
     def _check_bounds(cls, value: dict[str, tuple[Bound, ...]]) -> dict[str, tuple[Bound, ...]]:
         for name in value:
             _known_signal(name)
-        return value
-
-    @field_validator("windows")
-    @classmethod
-    def _check_windows(
-        cls, value: dict[str, tuple[tuple[float, float], ...]]
-    ) -> dict[str, tuple[tuple[float, float], ...]]:
-        for name, intervals in value.items():
-            for start, end in intervals:
-                if start >= end:
-                    raise ValueError(f"{name}: an interval must start before it ends")
         return value
 
     @model_validator(mode="after")

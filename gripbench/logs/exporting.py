@@ -120,6 +120,6 @@ def _map_of(recording: Recording, columns: dict[str, npt.NDArray[np.float64]]) -
             "channels": channels,
             "reference": reference,
             "score_from": recording.score_from,
-            "windows": recording.windows,
+            "windows": {"from_start": True, **recording.windows},
         }
     )

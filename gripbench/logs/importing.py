@@ -18,7 +18,7 @@ import numpy.typing as npt
 import pandas as pd
 
 from gripbench.configuration import parse
-from gripbench.envs.recordings import Bounds, Recording
+from gripbench.envs.recordings import Recording
 from gripbench.envs.signals import NEW, record_type
 from gripbench.envs.vehicles import CarOnPaper
 from gripbench.errors import InputError
@@ -33,6 +33,7 @@ from gripbench.logs.quality import QualityReport, judge
 from gripbench.logs.readers import read_log
 from gripbench.logs.series import Floats, Series, series_of, wrapped
 from gripbench.logs.sources import add_sources
+from gripbench.logs.windows import check_windows, placed_bound, placed_windows
 
 _MAXIMUM_GAP = 3.0  # reference samples further apart than this many median intervals leave a hole
 _GPS = ("course", "speed_gps", "velocity_north", "velocity_west")
@@ -149,13 +150,14 @@ def assemble(
     InputError
         On the first mistake in the map or the logs.
     """
-    recordings = []
+    recordings: list[Recording] = []
     report = QualityReport(())
     notes = [f"{log.path}: {note}" for log in logs.values() for note in log.notes]
     for run, part in _runs(logs, channel_map):
         recording, found = _recording(part, channel_map, vehicle, run)
         recordings.append(recording)
         report = report.joined(found, run if channel_map.runs else None)
+    check_windows(channel_map, recordings)
     provenance = Provenance(
         name=channel_map.name,
         description=channel_map.description,
@@ -214,7 +216,7 @@ def _recording(
     truth = _interpolated(reference, rows, origin)
     report = judge(channels, reference, dropped, zeros, vehicle)
     end = float(rows[-1]) - origin
-    windows = dict(channel_map.windows)
+    windows = placed_windows(channel_map, rows)
     if channel_map.training_runs:
         windows["train" if run in channel_map.training_runs else "test"] = ((0.0, end),)
     if channel_map.score_from >= end:
@@ -232,7 +234,7 @@ def _recording(
         notes={"time_origin": origin, **{f"zero_{name}": value for name, value in zeros.items()}},
         windows=windows,
         bounds=tuple(
-            Bounds(name, bound.low, bound.high, bound.start, bound.end)
+            placed_bound(channel_map, name, bound, origin)
             for name, bounds in channel_map.bounds.items()
             for bound in bounds
         ),

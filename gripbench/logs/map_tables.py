@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from gripbench.configuration import Configuration
 from gripbench.envs.vehicles import VEHICLE_PARAMETERS
@@ -306,21 +306,59 @@ class Bound(Configuration):
     low, high
         The interval, in SI units.
     start, end
-        When it holds [s]; by default always.
+        When it holds [s], on the clock of the map's windows; by default always.
     source
         How it is known.
     """
 
     low: float
     high: float
-    start: float = 0.0
-    end: float = 1e9
+    start: float | None = None
+    end: float | None = None
     source: str
 
     @model_validator(mode="after")
     def _check_order(self) -> Self:
-        if self.low > self.high or self.start >= self.end:
+        ordered = self.start is None or self.end is None or self.start < self.end
+        if self.low > self.high or not ordered:
             raise ValueError("low must not exceed high, and start must come before end")
+        return self
+
+
+Intervals = tuple[tuple[float, float], ...]
+"""Pairs of a start and an end [s]."""
+
+
+class Windows(Configuration):
+    """Named lists of intervals [s]: every key beside those below is the name of one.
+
+    Attributes
+    ----------
+    from_start
+        Whether times count from the first row; otherwise they are those of the log's own clock,
+        as the quality report gives them.
+    covered
+        Share of each interval, from 0 to 1, in which every signal of the reference has to be
+        known.
+    """
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, Intervals] = Field(init=False)
+
+    from_start: bool = False
+    covered: float = Field(default=0.9, ge=0.0, le=1.0)
+
+    @property
+    def intervals(self) -> dict[str, Intervals]:
+        """Return the lists by name."""
+        return dict(self.__pydantic_extra__)
+
+    @model_validator(mode="after")
+    def _check_order(self) -> Self:
+        for name, intervals in self.intervals.items():
+            for start, end in intervals:
+                if start >= end:
+                    raise ValueError(f"{name}: an interval must start before it ends")
         return self
 
 

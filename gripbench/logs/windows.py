@@ -1,0 +1,157 @@
+"""Windows and bounds of a map in, the same on the clock of a recording's rows out, checked.
+
+A map counts on the log's own clock, as the quality report does, or from the first row where it says
+so. A window that lies outside the log, or in which less is known than was asked for, is refused:
+scored in silence on what is left, it would be a wrong figure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from gripbench.envs.recordings import Bounds, Recording
+from gripbench.envs.signals import NEW
+from gripbench.errors import InputError
+from gripbench.logs.channel_map import Bound, ChannelMap
+from gripbench.logs.map_tables import Intervals
+
+_LONGEST = 10.0
+"""Mean distances between rows that a row stands for at most."""
+
+_EDGE = 1.5
+"""Mean distances between rows by which an interval may reach beyond the first or last row."""
+
+Floats = npt.NDArray[np.float64]
+
+
+def placed_windows(channel_map: ChannelMap, rows: Floats) -> dict[str, Intervals]:
+    """Return the windows that lie in a run, on the clock of its rows, which starts at 0.
+
+    Parameters
+    ----------
+    channel_map
+        The map.
+    rows
+        Times of the run's rows [s] on the log's clock, shape (n,).
+
+    Raises
+    ------
+    InputError
+        If an interval lies partly in the run and partly outside.
+    """
+    windows = channel_map.windows
+    origin = 0.0 if windows.from_start else float(rows[0])
+    end = float(rows[-1] - rows[0])
+    edge = _EDGE * end / (len(rows) - 1)
+    found: dict[str, Intervals] = {}
+    for name, intervals in windows.intervals.items():
+        kept = []
+        for index, (start, stop) in enumerate(intervals):
+            low, high = start - origin, stop - origin
+            if high <= 0.0 or low >= end:
+                continue  # of another run, or of none: `check_windows` sees it
+            if low < -edge or high > end + edge:
+                raise _outside(f"windows.{name}[{index}]", (start, stop), origin, end, windows.from_start)
+            kept.append((max(low, 0.0), high))
+        if kept or not intervals:
+            found[name] = tuple(kept)
+    return found
+
+
+def placed_bound(channel_map: ChannelMap, signal: str, bound: Bound, origin: float) -> Bounds:
+    """Return a bound on the clock of a run's rows; `origin` is the first row [s]."""
+    origin = 0.0 if channel_map.windows.from_start else origin
+    start = -np.inf if bound.start is None else bound.start - origin
+    end = np.inf if bound.end is None else bound.end - origin
+    return Bounds(signal, bound.low, bound.high, start, end)
+
+
+def check_windows(channel_map: ChannelMap, recordings: Sequence[Recording]) -> None:
+    """Refuse a window that no run holds, or in which too little of the reference is known.
+
+    Raises
+    ------
+    InputError
+        With the key of the window, what the log covers and what to do.
+    """
+    windows = channel_map.windows
+    for name, intervals in windows.intervals.items():
+        for index, (start, stop) in enumerate(intervals):
+            key, held = f"windows.{name}[{index}]", False
+            for recording in recordings:
+                origin = 0.0 if windows.from_start else recording.notes["time_origin"]
+                low, high = start - origin, stop - origin
+                end = float(recording.observations["time"][-1])
+                if high <= 0.0 or low >= end:
+                    continue
+                held = True
+                _check_known(channel_map, recording, key, (low, high), origin)
+            if not held:
+                first = recordings[0]
+                origin = 0.0 if windows.from_start else first.notes["time_origin"]
+                end = max(
+                    float(one.observations["time"][-1])
+                    + (0.0 if windows.from_start else one.notes["time_origin"])
+                    for one in recordings
+                )
+                raise _outside(key, (start, stop), origin, end - origin, windows.from_start)
+    for signal, bounds in channel_map.bounds.items():
+        for index, bound in enumerate(bounds):
+            placed = [
+                placed_bound(channel_map, signal, bound, recording.notes["time_origin"])
+                for recording in recordings
+            ]
+            if not any(
+                one.start < recording.observations["time"][-1] and one.end > 0.0
+                for one, recording in zip(placed, recordings, strict=True)
+            ):
+                origin = 0.0 if windows.from_start else recordings[0].notes["time_origin"]
+                end = float(recordings[-1].observations["time"][-1])
+                times = (bound.start or 0.0, bound.end or np.inf)
+                raise _outside(f"bounds.{signal}[{index}]", times, origin, end, windows.from_start)
+
+
+def _check_known(
+    channel_map: ChannelMap,
+    recording: Recording,
+    key: str,
+    interval: tuple[float, float],
+    origin: float,
+) -> None:
+    low, high = interval
+    time, truth = recording.truth["time"], recording.truth
+    longest = _LONGEST * float(time[-1]) / (len(time) - 1)
+    worth = np.minimum(np.diff(time, append=time[-1] + longest / _LONGEST), longest)
+    inside = (time >= low) & (time <= high) & (time >= recording.score_from)
+    signals = [name for name in truth.dtype.names or () if name != "time" and NEW not in name]
+    judged: list[tuple[str, npt.NDArray[np.bool_]]] = [("row", inside)]
+    judged += [(f"reference '{name}'", inside & np.isfinite(truth[name])) for name in signals]
+    least = channel_map.windows.covered
+    for what, known in judged:
+        share = min(float(worth[known].sum()) / (high - low), 1.0)
+        if share < least or not known.any():
+            later = recording.score_from > low and not what.startswith("reference")
+            cause = f"; score_from leaves out the first {recording.score_from:g} s" if later else ""
+            raise InputError(
+                f"{recording.scenario}: key '{key}': {low + origin:g} to {high + origin:g} s has "
+                f"{int(known.sum())} samples with a {what}, {100.0 * share:.0f} % of its time, "
+                f"fewer than asked for{cause}; choose another interval, or set windows.covered "
+                f"below {least:g}"
+            )
+
+
+def _outside(
+    key: str, interval: tuple[float, float], origin: float, length: float, from_start: bool
+) -> InputError:
+    start, stop = interval
+    clock = "counted from the first row" if from_start else "on its own clock"
+    hint = ""
+    if not from_start and origin != 0.0 and start >= 0.0 and stop <= length + 1.0:
+        hint = "; for times from the first row set windows.from_start = true"
+    return InputError(
+        f"channel map: key '{key}': {start:.10g} to {stop:.10g} s is outside the log, which covers "
+        f"{origin:.10g} to {origin + length:.10g} s {clock}{hint}"
+    )
