@@ -54,10 +54,11 @@ def placed_windows(channel_map: ChannelMap, rows: Floats) -> dict[str, Intervals
             if high <= 0.0 or low >= end:
                 continue  # of another run, or of none: `check_windows` sees it
             if low < -edge or high > end + edge:
-                raise _outside(f"windows.{name}[{index}]", (start, stop), origin, end, windows.from_start)
+                raise _outside(
+                    f"windows.{name}[{index}]", (start, stop), origin, end, windows.from_start
+                )
             kept.append((max(low, 0.0), high))
-        if kept or not intervals:
-            found[name] = tuple(kept)
+        found[name] = tuple(kept)  # empty in another run: nothing of this one counts
     return found
 
 
@@ -136,7 +137,7 @@ def _check_known(
             later = recording.score_from > low and not what.startswith("reference")
             cause = f"; score_from leaves out the first {recording.score_from:g} s" if later else ""
             raise InputError(
-                f"{recording.scenario}: key '{key}': {low + origin:g} to {high + origin:g} s has "
+                f"{recording.scenario}: key '{key}': {low + origin:.3f} to {high + origin:.3f} s has "
                 f"{int(known.sum())} samples with a {what}, {100.0 * share:.0f} % of its time, "
                 f"fewer than asked for{cause}; choose another interval, or set windows.covered "
                 f"below {least:g}"
@@ -152,6 +153,6 @@ def _outside(
     if not from_start and origin != 0.0 and start >= 0.0 and stop <= length + 1.0:
         hint = "; for times from the first row set windows.from_start = true"
     return InputError(
-        f"channel map: key '{key}': {start:.10g} to {stop:.10g} s is outside the log, which covers "
-        f"{origin:.10g} to {origin + length:.10g} s {clock}{hint}"
+        f"channel map: key '{key}': {start:.3f} to {stop:.3f} s is outside the log, which covers "
+        f"{origin:.3f} to {origin + length:.3f} s {clock}{hint}"
     )

@@ -183,6 +183,8 @@ def on_recording(spec: MethodSpec, scenario: Scenario) -> MethodSpec:
     if spec.declaration.name not in given:
         return spec
     settings = given[spec.declaration.name] | spec.parameters
+    from gripbench.bench.catalogue.registry import method_digest
+
     try:
         if spec.isolated and spec.source.kind != "value":
             from gripbench.bench.running.sandbox import declare
@@ -194,7 +196,10 @@ def on_recording(spec: MethodSpec, scenario: Scenario) -> MethodSpec:
     except InputError as error:
         name = spec.declaration.name
         raise InputError(f"{scenario.name}: key 'settings.{name}': {error}") from None
-    return replace(spec, declaration=declaration, parameters=settings, shown=spec.label)
+    changed = method_digest(spec.source, declaration)
+    return replace(
+        spec, declaration=declaration, parameters=settings, digest=changed, shown=spec.label
+    )
 
 
 def judged(recording: Recording, estimates: npt.NDArray[Any]) -> Recording:
