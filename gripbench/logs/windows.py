@@ -137,8 +137,8 @@ def _check_known(
             later = recording.score_from > low and not what.startswith("reference")
             cause = f"; score_from leaves out the first {recording.score_from:g} s" if later else ""
             raise InputError(
-                f"{recording.scenario}: key '{key}': {low + origin:.3f} to {high + origin:.3f} s has "
-                f"{int(known.sum())} samples with a {what}, {100.0 * share:.0f} % of its time, "
+                f"{recording.scenario}: key '{key}': {low + origin:.3f} to {high + origin:.3f} s "
+                f"has {int(known.sum())} samples with a {what}, {100.0 * share:.0f} % of its time, "
                 f"fewer than asked for{cause}; choose another interval, or set windows.covered "
                 f"below {least:g}"
             )
