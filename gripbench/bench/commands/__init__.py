@@ -6,5 +6,8 @@ RANK = "Rank them"
 PUBLISH = "Publish results"
 LOGS = "Logs of real vehicles"
 
-ORDER = ("reproduce", "evidence", "figures", "run", "check", "plot", "catalogue", "rank", "results")
+ORDER = (
+    "reproduce", "evidence", "figures", "run", "check", "outside", "plot", "catalogue",
+    "rank", "results",
+)  # fmt: skip
 """Modules whose commands come first in `--help`, in this order."""

@@ -15,7 +15,7 @@ from gripbench.bench.ranking.answers import Answer
 from gripbench.bench.ranking.ranking import Board
 from gripbench.bench.ranking.resolution import resolution
 from gripbench.bench.ranking.skill import NO_BETTER
-from gripbench.bench.ranking.summary import FOOTNOTE, marked
+from gripbench.bench.ranking.summary import FOOTNOTE, OUTSIDE_FOOTNOTE, marked
 from gripbench.bench.scoring.metric import SIGNAL_UNIT, Metric
 from gripbench.bench.scoring.metrics import metrics
 from gripbench.envs.signals import signal
@@ -134,6 +134,8 @@ def _notes(board: Board, wide: bool) -> tuple[str, ...]:
         notes.append(f"{GUESS} baseline: a guess or a formula on paper.")
     if board.lines["idealised"].any():
         notes.append(FOOTNOTE + ".")
+    if board.lines["computed_outside"].any():
+        notes.append(OUTSIDE_FOOTNOTE + ".")
     return tuple(notes)
 
 
@@ -324,7 +326,7 @@ def _metric_cells(line: Mapping[Any, Any], target: str) -> dict[str, Any]:
 def _name(line: Mapping[Any, Any]) -> str:
     """Return a method's label with the marks that stand below the table."""
     marks = (GUESS if line["baseline"] else "") + (NOT_BETTER if line["verdict"] else "")
-    name = marked(line["label"], line["idealised"])
+    name = marked(line["label"], line["idealised"], line["computed_outside"])
     return f"{name} {marks}" if marks else name
 
 

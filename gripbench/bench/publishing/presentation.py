@@ -12,7 +12,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 from rich.text import Text
 
-from gripbench.bench.ranking.summary import FOOTNOTE, failures, marked
+from gripbench.bench.ranking.summary import FOOTNOTE, OUTSIDE_FOOTNOTE, failures, marked
 from gripbench.envs.signals import signal
 from gripbench.errors import one_line
 
@@ -153,7 +153,7 @@ def _across(part: pd.DataFrame, factor: float) -> Table:
         table.add_column(scenario, justify="right", no_wrap=True)
     for label, lines in part.groupby("label", sort=False):
         texts = {line["scenario"]: cell(line, factor) for _, line in lines.iterrows()}
-        name = marked(str(label), lines["idealised"].iloc[0])
+        name = marked(str(label), *lines[["idealised", "computed_outside"]].iloc[0])
         table.add_row(name, *(texts.get(scenario, "") for scenario in scenarios))
     return table
 
@@ -172,7 +172,7 @@ def _down(part: pd.DataFrame, factor: float, responds: bool) -> Table:
         table.add_section()
         table.add_row(Text(one_line(str(scenario)), "bold"))
         for line in shown:
-            name = marked(line["label"], line["idealised"])
+            name = marked(line["label"], line["idealised"], line["computed_outside"])
             more = _response(line, factor) if responds else ()
             table.add_row(f"  {name}", cell(line, factor), *more)
     return table
@@ -208,7 +208,7 @@ def _jumps(part: pd.DataFrame) -> Table:
         table.add_row(Text(one_line(str(scenario)), "bold"))
         for _, line in lines.iterrows():
             table.add_row(
-                f"  {marked(line['label'], line['idealised'])}",
+                f"  {marked(line['label'], line['idealised'], line['computed_outside'])}",
                 seconds(line["jump_delay"], line["jump_low"], line["jump_high"]),
                 f"{line['jump_settled']:.0f}/{line['jumps']:.0f}",
             )
@@ -223,6 +223,8 @@ def print_summary(summary: pd.DataFrame) -> None:
         out.print(table)
     if (summary["idealised"] != "").any():
         out.print(FOOTNOTE)
+    if summary["computed_outside"].any():
+        out.print(OUTSIDE_FOOTNOTE)
 
 
 def print_failures(rows: pd.DataFrame) -> None:

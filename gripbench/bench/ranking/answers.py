@@ -1,7 +1,7 @@
 """Rows and boards in; in words and as a table, which method to take, how good it is, how sure out.
 
-The answer of a board is its best method that a vehicle could run: no baseline, and none that
-reads a channel which no sensor gives.
+The answer of a board is its best method that a vehicle could run: no baseline, none that
+reads a channel which no sensor gives, and none that was computed outside and not checked.
 """
 
 from __future__ import annotations
@@ -68,7 +68,8 @@ class Answer:
 def best_line(board: Board) -> Any | None:
     """Return the line of the method that a board recommends, None where it has none."""
     lines = board.lines
-    real = lines[~lines["baseline"].astype(bool) & (lines["idealised"] == "")]
+    checked = ~lines["baseline"].astype(bool) & ~lines["computed_outside"]
+    real = lines[checked & (lines["idealised"] == "")]
     real = real[real["score"].notna()]
     return None if real.empty else real.iloc[0]
 

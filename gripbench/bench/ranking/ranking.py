@@ -33,6 +33,7 @@ from gripbench.bench.ranking.pareto import pareto_front
 from gripbench.bench.ranking.plans import plan_of
 from gripbench.bench.ranking.resolution import resolution
 from gripbench.bench.ranking.skill import against_guess, best_baseline
+from gripbench.bench.ranking.summary import outside_of
 from gripbench.bench.running.recorded_scenarios import PREFIX
 from gripbench.bench.scoring.metric import Metric, pooled_rms
 from gripbench.bench.scoring.metrics import metrics
@@ -40,9 +41,9 @@ from gripbench.errors import InputError, unknown
 
 _BEFORE = (
     "target", "sensors", "rank", "rank_from", "rank_to", "group", "label", "method", "variant",
-    "title", "reads", "idealised", "baseline", "score", "score_from", "score_to", "elsewhere_from",
-    "elsewhere_to", "skill", "verdict", "beats_guess", "beats_next", "worse_than_guess",
-    "rms", "rms_from", "rms_to",
+    "title", "reads", "idealised", "baseline", "computed_outside", "score", "score_from",
+    "score_to", "elsewhere_from", "elsewhere_to", "skill", "verdict", "beats_guess", "beats_next",
+    "worse_than_guess", "rms", "rms_from", "rms_to",
 )  # fmt: skip
 _SCORES = ("score", "score_from", "score_to", "elsewhere_from", "elsewhere_to")
 _BEHIND = (
@@ -370,6 +371,7 @@ def _summary(group: pd.DataFrame, complete: bool, settings: _Settings) -> dict[s
         for name in ("label", "method", "variant", "title", "idealised", "baseline")
     }
     line |= {
+        "computed_outside": bool(outside_of(group).any()),
         "reads": ", ".join(instruments(first["sensors"])),
         "rms": pooled_rms(good["sum_of_squares"], good["count"]) if complete else np.nan,
         "rms_from": low,

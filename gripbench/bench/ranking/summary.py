@@ -18,6 +18,11 @@ MARK = "†"
 
 FOOTNOTE = f"{MARK} reads an idealised channel, which no sensor in a vehicle gives"
 
+OUTSIDE = "‡"
+"""Follows the name of a method whose estimates were handed in."""
+
+OUTSIDE_FOOTNOTE = f"{OUTSIDE} computed outside: neither causality nor runtime checked"
+
 
 def summary(rows: pd.DataFrame) -> pd.DataFrame:
     """Return one line for each scenario, target and method.
@@ -29,7 +34,8 @@ def summary(rows: pd.DataFrame) -> pd.DataFrame:
 
     Returns
     -------
-    Frame with the columns `scenario, target, label, idealised, runs, ok, status, rms, low, high`:
+    Frame with the columns `scenario, target, label, idealised, computed_outside, runs, ok, status,
+    rms, low, high`:
     `rms` is pooled over the runs that are `ok` by the mean of squares, `low` and `high` bound its
     95 % interval (over runs, see `statistics.pooled_rms_interval`), `status` counts the others.
     For the available friction also, over the runs that are excited, `excited, excited_rms,
@@ -52,6 +58,7 @@ def summary(rows: pd.DataFrame) -> pd.DataFrame:
                 "target": target,
                 "label": label,
                 "idealised": str(group["idealised"].iloc[0]),
+                "computed_outside": bool(outside_of(group).any()),
                 "runs": len(group),
                 "ok": len(good),
                 "status": ", ".join(f"{count} {status}" for status, count in others.items()),
@@ -62,7 +69,8 @@ def summary(rows: pd.DataFrame) -> pd.DataFrame:
             }
         )
     columns = (
-        "scenario", "target", "label", "idealised", "runs", "ok", "status", "rms", "low", "high",
+        "scenario", "target", "label", "idealised", "computed_outside", "runs", "ok", "status",
+        "rms", "low", "high",
         "excited", "excited_rms", "excited_low", "excited_high",
         "settled", "delay", "delay_low", "delay_high",
         "jumps", "jump_settled", "jump_delay", "jump_low", "jump_high",
@@ -108,9 +116,26 @@ def _mean_of_settled(delays: np.ndarray) -> tuple[int, float, float, float]:
     return len(finite), mean, float(low), float(high)
 
 
-def marked(label: str, idealised: str | tuple[str, ...]) -> str:
-    """Return a method's label, marked if it reads an idealised channel."""
-    return label + MARK if idealised else label
+def marked(label: str, idealised: str | tuple[str, ...], outside: bool = False) -> str:
+    """Return a method's label with its marks.
+
+    Parameters
+    ----------
+    label
+        The label.
+    idealised
+        Idealised channels that it reads.
+    outside
+        Whether its estimates were handed in.
+    """
+    return label + (MARK if idealised else "") + (OUTSIDE if outside else "")
+
+
+def outside_of(rows: pd.DataFrame) -> pd.Series:
+    """Return for each row whether its estimates were handed in; a frame of old rows knows none."""
+    if "computed_outside" not in rows:
+        return rows["label"].map(lambda _: False).astype(bool)
+    return rows["computed_outside"].astype(bool)
 
 
 def not_run(rows: pd.DataFrame) -> dict[str, str]:

@@ -21,7 +21,7 @@ from gripbench.errors import LONGEST, InputError, one_line
 if TYPE_CHECKING:
     import pandas as pd
 
-SCHEMA_VERSION = 4
+SCHEMA_VERSION = 5
 """Version of the stored form; rows of every earlier version still load (see `_MIGRATIONS`)."""
 
 Text = Annotated[str, BeforeValidator(lambda text: _storable(text))]
@@ -96,6 +96,8 @@ class Row(Configuration):
         kind and name; where one differs the cell runs again.
     untracked
         What it did whose result no digest can follow: the row is never used again.
+    computed_outside
+        Whether the estimates were handed in: neither causality nor runtime was checked.
     method_digest
         Digest of source and settings of a plug-in; empty for a method that ships with gripbench.
     checked
@@ -130,6 +132,7 @@ class Row(Configuration):
     world: str = ""
     dependencies: dict[str, str] = Field(default_factory=dict)
     untracked: tuple[str, ...] = ()
+    computed_outside: bool = False
     method_digest: str = ""
     checked: Checked = Field(default="", exclude=True)
     versions: dict[str, str] = Field(default_factory=dict)
@@ -190,6 +193,7 @@ _MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {
     1: lambda content: {**content, "schema_version": 2},  # 2 added the response of the friction
     2: lambda content: {**content, "schema_version": 3},  # 3 added what a row rests on
     3: _to_metrics,
+    4: lambda content: {**content, "schema_version": 5},  # 5 added where it was computed
 }
 """For each earlier version, the function that turns its content into the next version's."""
 
@@ -238,7 +242,7 @@ def frame_of(rows: Iterable[Row]) -> pd.DataFrame:
     vanishes from a table made of the frame. Columns: `scenario, seed, label, method, variant,
     title, target, status, reason`, the columns of each metric, `sample_period, step_batch,
     step_p50, step_p99, step_max, deadline_misses, sensors, idealised, parameters, baseline,
-    world, key, checked`.
+    world, key, checked, computed_outside`.
 
     A metric has a column of its name; one that is pooled by totals also `<name>_total` and
     `<name>_count`, which for the RMS are called `sum_of_squares` and `count`. NaN: the metric has
@@ -268,6 +272,7 @@ _COMMON = (
     "scenario", "seed", "label", "method", "variant", "title", "status", "reason",
     "sample_period", "step_batch", "step_p50", "step_p99", "step_max", "deadline_misses",
     "sensors", "idealised", "parameters", "baseline", "world", "key", "checked",
+    "computed_outside",
 )  # fmt: skip
 
 
@@ -295,6 +300,7 @@ def _common_columns(row: Row) -> dict[str, Any]:
         "world": row.world,
         "key": row.key,
         "checked": row.checked,
+        "computed_outside": row.computed_outside,
     }
 
 

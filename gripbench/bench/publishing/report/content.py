@@ -122,15 +122,17 @@ def found_boards(rows: pd.DataFrame, targets: Sequence[str]) -> list[Board]:
 def heat_map(rows: pd.DataFrame, target: str) -> dict[str, Any]:
     """Return the RMS of every method in every scenario, and its ratio to the scenario's best.
 
-    The best is sought among the methods that read no idealised channel.
+    The best is sought among the methods that read no idealised channel and were run here.
     """
     lines = summary(rows[rows["target"] == target])
     scenarios = list(dict.fromkeys(lines["scenario"]))
     labels = list(dict.fromkeys(lines["label"]))
     cells = {(line["label"], line["scenario"]): line for _, line in lines.iterrows()}
-    real = lines[lines["idealised"] == ""]
+    real = lines[(lines["idealised"] == "") & ~lines["computed_outside"].astype(bool)]
     best = (lines if real.empty else real).groupby("scenario")["rms"].min()
-    names = dict(zip(lines["label"], lines["idealised"], strict=True))
+    marks = {
+        line["label"]: (line["idealised"], line["computed_outside"]) for _, line in lines.iterrows()
+    }
     factor = axis_scale(target)[0]
     ratio: list[list[float | None]] = []
     text: list[list[str]] = []
@@ -150,7 +152,7 @@ def heat_map(rows: pd.DataFrame, target: str) -> dict[str, Any]:
     return {
         "scenarios": scenarios,
         "roads": [road_of(name) for name in scenarios],
-        "methods": [marked(label, names[label]) for label in labels],
+        "methods": [marked(label, *marks[label]) for label in labels],
         "ratio": ratio,
         "text": text,
     }
