@@ -214,13 +214,11 @@ def test_variances_are_scored_and_a_nan_is_a_diverged_row(exported):
     assert "force_x_front is nan from t = 0.7 s" in {row.reason for row in rows}
 
 
-def test_a_drive_without_its_channels_is_skipped(suite, tmp_path):
+def test_a_drive_without_the_channels_needs_no_estimates_and_is_skipped(suite, tmp_path):
     folder = tmp_path / "mixed"
     folder.mkdir()
     (folder / "one.toml").write_text((suite.parent / "one.toml").read_text())
-    other = _scenario(folder, "turn", "single_lane_change")
-    text = other.read_text().replace("score_from = ", "score_from = 0.0 #")
-    other.write_text(text)
+    other = CONFIGS / "scenarios" / "mu_jump_lane_change.toml"
     mixed = folder / "mixed.toml"
     mixed.write_text(
         'name = "mixed"\ndescription = "Two."\nmethods = ["slip_slope"]\nseeds = 1\n'
@@ -228,11 +226,18 @@ def test_a_drive_without_its_channels_is_skipped(suite, tmp_path):
     )
     drives, results = tmp_path / "drives", tmp_path / "results"
     export_suite(str(mixed), None, drives, results)
-    for place in _folders(drives):
-        if "accel_x" in (place / "observations.csv").read_text().partition("\n")[0].split(","):
-            _estimates(place).to_csv(place / "estimates.csv", index=False)
-    rows = submit(drives, "elsewhere", ["accel_x", "drive_torque_front_left"], results)
-    assert {row.scenario: row.status for row in rows}["one"] in ("ok", "skipped")
+    (longitudinal, lateral) = sorted(
+        _folders(drives), key=lambda place: "yaw_rate" in (place / "README.md").read_text()
+    )
+    seen = _read(lateral / "observations.csv")
+    frame = pd.DataFrame({"time": seen["time"], "sideslip": 0.0 * seen["yaw_rate"]})
+    frame.to_csv(lateral / "estimates.csv", index=False)
+    rows = submit(drives, "elsewhere", ["yaw_rate"], results)
+    assert {row.scenario: row.status for row in rows} == {
+        "one": "skipped",
+        "mu_jump_lane_change": "ok",
+    }
+    assert not (longitudinal / "estimates.csv").exists()
 
 
 def _spoil_missing(folder):
