@@ -2,10 +2,13 @@
 
 Scores are geometric means over scenarios: without a lower bound a cell that is exact to rounding
 would outweigh all others. So no cell counts as better than what is measured as the truth in a
-real vehicle. Inertial reference systems: OxTS RT3000 data sheet (velocity .05 km/h, roll and pitch
-.03 deg, heading .1 deg, sideslip .15 deg at 50 km/h). Wheel force: Kistler RoaDyn S635 data sheet
-(hysteresis and linearity each .5 % of 20 kN: .1 kN at usual loads). Friction: ASTM E274 states .02
-for repeated locked-wheel measurements; half of it is a guess for a mean of several.
+real vehicle.
+
+Every value here is a guess of what reference instruments reach, by their usual classes and not by
+a data sheet read: inertial systems with differential GPS (as OxTS RT3000: velocity .05 km/h, roll
+and pitch .03 deg, heading .1 deg, sideslip .15 deg), wheel force transducers (as Kistler RoaDyn:
+.1 kN, half a percent of 20 kN), locked-wheel friction (as ASTM E274: .02 for a repetition, half of
+it for a mean of several).
 """
 
 from __future__ import annotations
