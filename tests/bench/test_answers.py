@@ -3,19 +3,22 @@
 import xml.etree.ElementTree as ElementTree
 
 import numpy as np
+import pandas as pd
 import pytest
-from synthetic_rows import GPS, IDEAL, TORQUE, noisy_frame, noisy_rows
+from synthetic_rows import GPS, IDEAL, TORQUE, noisy_frame, noisy_rows, row
 from typer.testing import CliRunner
 
 from gripbench.bench.command_line import application
 from gripbench.bench.publishing.board_tables import answer_table, board_table
-from gripbench.bench.publishing.report.content import profile
+from gripbench.bench.publishing.leaderboard import build, text_of
+from gripbench.bench.publishing.report.content import found_boards, profile
 from gripbench.bench.publishing.report.critical import critical_differences
 from gripbench.bench.publishing.tables import plain
 from gripbench.bench.ranking.answers import answers, words
-from gripbench.bench.ranking.grids import instruments
+from gripbench.bench.ranking.grids import PRODUCTION, instruments
 from gripbench.bench.ranking.plans import plan_of, road_of
 from gripbench.bench.ranking.ranking import boards
+from gripbench.bench.running.rows import frame_of
 from gripbench.bench.running.store import Store
 
 GUESS = {"guess": {"baseline": True, "sensors": ()}}
@@ -114,3 +117,46 @@ def test_a_profile_starts_with_the_share_of_wins_and_ends_at_one():
     shares = profile(board)["methods"]
     assert shares["a"][0] + shares["b"][0] == 1.0
     assert shares["a"][-1] == shares["b"][-1] == 1.0
+
+
+def test_level_one_and_its_production_cars_stand_first_and_the_papers_setting_last():
+    bus = ("wheel_speed_front", "steer_angle", "yaw_rate", "accel_y")
+    assert instruments(bus) == PRODUCTION
+    of_label = {"guess": {"sensors": bus, "baseline": True}, "bus": {"sensors": bus},
+                "gps": {"sensors": (*bus, "speed_gps")}}  # fmt: skip
+    frames = [
+        noisy_frame({"bus": 0.3, "gps": 0.1, "guess": 0.5}, scenarios=(scenario,), **of_label)
+        for scenario in ("constant_mu", "constant_mu@1", "constant_mu@2")
+    ]
+    frame = pd.concat(frames, ignore_index=True)
+    found = answers(frame, ["mu_front"])
+    assert [(one.setting, one.method) for one in found] == [
+        ("production spread", "bus"), ("production spread", "gps"),
+        ("wide spread, level 2", "bus"), ("wide spread, level 2", "gps"),
+        ("the papers' setting", "bus"), ("the papers' setting", "gps"),
+    ]  # fmt: skip
+    made, shown = build(frame)
+    assert shown[0].sensors == PRODUCTION
+    assert [board.scenarios[0] for board in shown] == [
+        name for name in ("constant_mu@1", "constant_mu@2", "constant_mu") for _ in range(3)
+    ]
+    text = text_of(made, shown)
+    assert text.index("# Level 1") < text.index("# Wide") < text.index("# Level 0, the papers'")
+    assert made.answers_found() == found
+    assert found_boards(frame, ["mu_front"])[0].scenarios[0] == "constant_mu@1"
+
+
+def test_more_sensors_that_give_a_larger_error_are_no_answer():
+    """By score the larger set's method is first, by the error that is shown it is not."""
+    def frame(on_the_hill):
+        rms = {"a": (1.0, 1.0), "c": (3.0, 3.0), "b": (0.1, on_the_hill)}
+        return frame_of([
+            row(label, seed, value * (1.0 + 0.01 * seed), scenario,
+                sensors=GPS if label == "b" else TORQUE)
+            for label, values in rms.items()
+            for scenario, value in zip(("step", "hill"), values, strict=True)
+            for seed in range(12)
+        ])  # fmt: skip
+
+    assert [one.method for one in answers(frame(0.9), ["mu_front"])] == ["a", "b"]
+    assert [one.method for one in answers(frame(2.0), ["mu_front"])] == ["a"]

@@ -22,7 +22,8 @@ from gripbench.bench.publishing.board_tables import Timings, answer_table, board
 from gripbench.bench.publishing.tables import Table, markdown
 from gripbench.bench.publishing.timings import RelativeRuntime
 from gripbench.bench.ranking.answers import Answer, answers, words
-from gripbench.bench.ranking.grids import ANY
+from gripbench.bench.ranking.grids import ANY, opening
+from gripbench.bench.ranking.plans import setting_of, standing_of
 from gripbench.bench.ranking.ranking import Board, boards
 from gripbench.bench.ranking.statistics import CONFIDENCE
 from gripbench.configuration import Configuration, parse
@@ -108,7 +109,9 @@ def build(
 ) -> tuple[Leaderboard, list[Board]]:
     """Return the leaderboard of these rows, and its boards.
 
-    Behind the boards of a target's sensor sets comes one with all its methods and what each reads.
+    Production cars (level 1) come first and open with the sensors that they all have; the papers'
+    setting comes last. Behind the boards of a target's sensor sets comes one with all its methods
+    and what each reads.
 
     Parameters
     ----------
@@ -132,7 +135,7 @@ def build(
     for target in dict.fromkeys(board.target for board in found):
         if len({board.sensors for board in found if board.target == target}) > 1:
             found += boards(rows, target, ANY, confidence=confidence)
-    found.sort(key=lambda board: board.target)
+    found.sort(key=lambda board: (standing_of(board), opening(board.sensors) > 0, board.target))
     return (
         Leaderboard(
             gripbench=gripbench.__version__,
@@ -215,10 +218,21 @@ def text_of(leaderboard: Leaderboard, found: list[Board]) -> str:
         "have every column.",
         "",
     ]
-    for board in found:
+    settings = [setting_of(board.scenarios[0]) if board.scenarios else "" for board in found]
+    before = ""
+    for board, setting in zip(found, settings, strict=True):
+        if setting != before:
+            parts += [f"# {_HEADINGS.get(setting, setting.capitalize() or 'Own scenarios')}", ""]
+            before = setting
         table = _without_caption(board_table(board, leaderboard.runtimes or None))
         parts += [f"## {board.title}", "", f"**{words(board)}**", "", table, ""]
     return "\n".join(parts).rstrip() + "\n"
+
+
+_HEADINGS = {
+    "production spread": "Level 1: every seed another car, road, drive and instruments",
+    "the papers' setting": "Level 0, the papers' setting: the very car on paper is driven",
+}
 
 
 ANSWER_TITLE = "Which method for which road and sensors:"

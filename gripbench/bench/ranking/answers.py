@@ -12,7 +12,8 @@ from typing import Any
 
 import pandas as pd
 
-from gripbench.bench.ranking.plans import plan_of, road_of
+from gripbench.bench.ranking.grids import opening
+from gripbench.bench.ranking.plans import plan_of, road_of, setting_of, standing
 from gripbench.bench.ranking.ranking import Board, boards
 from gripbench.envs.signals import IDEALISED, signal
 from gripbench.errors import InputError
@@ -43,6 +44,8 @@ class Answer:
         One less its error over that of the best baseline; NaN without one.
     drives
         Number of drives.
+    setting
+        What cars were driven, in words, see `plans.setting_of`.
     """
 
     target: str
@@ -58,6 +61,7 @@ class Answer:
     better: float
     skill: float
     drives: int
+    setting: str = ""
 
     @property
     def useful(self) -> bool:
@@ -112,8 +116,10 @@ def words(board: Board) -> str:
 def answers(rows: pd.DataFrame, targets: Iterable[str]) -> list[Answer]:
     """Return the answers for every target, plan, kind of road and set of sensors.
 
-    A set of sensors is left out where a smaller one gives the same method: what it adds is not
-    used. So are sets with a channel that no sensor gives.
+    A set of sensors is left out where a smaller one gives the same method, or one with no larger
+    error: what it adds is not used. So are sets with a channel that no sensor gives. First stands
+    what holds for production cars (level 1), and there what their own sensors allow; last what
+    repeats the papers.
 
     Parameters
     ----------
@@ -122,18 +128,22 @@ def answers(rows: pd.DataFrame, targets: Iterable[str]) -> list[Answer]:
     targets
         Signals that are estimated.
     """
-    found: list[Answer] = []
+    found: list[tuple[int, Answer]] = []
     for target in targets:
         ran = rows[(rows["target"] == target) & (rows["status"] != "skipped")]
         roads = {name: (plan_of(name), road_of(name)) for name in ran["scenario"].unique()}
         kinds = sorted(set(roads.values()), key=lambda kind: (kind[0], ROADS.index(kind[1])))
         for kind in kinds:
             names = [name for name, its in roads.items() if its == kind]
-            found += _of_road(rows[rows["scenario"].isin(names)], target, *kind)
-    return found
+            place = min(map(standing, names))
+            part = rows[rows["scenario"].isin(names)]
+            setting = setting_of(names[0])
+            found += [(place, one) for one in _of_road(part, target, *kind, setting)]
+    found.sort(key=lambda item: (item[0], opening(item[1].sensors) == 2))
+    return [one for _, one in found]
 
 
-def _of_road(rows: pd.DataFrame, target: str, plan: str, road: str) -> list[Answer]:
+def _of_road(rows: pd.DataFrame, target: str, plan: str, road: str, setting: str) -> list[Answer]:
     try:
         made = boards(rows, target, resamples=200)
     except InputError:
@@ -143,10 +153,11 @@ def _of_road(rows: pd.DataFrame, target: str, plan: str, road: str) -> list[Answ
         line = best_line(board)
         if line is None or IDEALISED in board.sensors:
             continue
-        known = (one for one in found if set(one.sensors) <= set(board.sensors))
-        if any(one.method == line["label"] for one in known):
-            continue
         shown = signal(target)
+        error = shown.display_factor * float(line["rms"])
+        known = (one for one in found if set(one.sensors) <= set(board.sensors))
+        if any(one.method == line["label"] or one.error <= error for one in known):
+            continue
         found.append(
             Answer(
                 target=target,
@@ -155,13 +166,14 @@ def _of_road(rows: pd.DataFrame, target: str, plan: str, road: str) -> list[Answ
                 sensors=board.sensors,
                 method=str(line["label"]),
                 guess=board.guess,
-                error=shown.display_factor * float(line["rms"]),
+                error=error,
                 low=shown.display_factor * float(line["rms_from"]),
                 high=shown.display_factor * float(line["rms_to"]),
                 unit="" if shown.display_unit == "-" else shown.display_unit,
                 better=float(line["beats_guess"]),
                 skill=float(line["skill"]),
                 drives=int(line["cells"]),
+                setting=setting,
             )
         )
     return found

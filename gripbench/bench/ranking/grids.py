@@ -69,6 +69,17 @@ class Grid:
         return len(self.scenarios) * len(self.seeds) + len(self.single)
 
 
+PRODUCTION = ("accelerometer", "gyroscope", "steering angle sensor", "wheel speed sensor")
+"""What every production car has on its bus; its boards and answers stand first."""
+
+
+def opening(sensors: tuple[str, ...]) -> int:
+    """Return where a set of instruments stands: a production car's first, then parts of it."""
+    if sensors == PRODUCTION:
+        return 0
+    return 1 if sensors and set(sensors) <= set(PRODUCTION) else 2
+
+
 def instruments(channels: str | Iterable[str]) -> tuple[str, ...]:
     """Return what gives these channels, without repetition, in alphabetical order.
 
@@ -87,7 +98,7 @@ def sensor_sets(rows: pd.DataFrame) -> list[tuple[str, ...]]:
 
     Each set that a method reads, but for those that tell nothing of their own: with fewer than two
     methods besides baselines, or with the same ones as a larger set. Their methods stand on the
-    boards of the larger sets.
+    boards of the larger sets. What a production car has is never left out.
     """
     readers: dict[tuple[str, ...], set[str]] = {}
     for (channels, label), part in rows.groupby(["sensors", "label"]):
@@ -101,7 +112,7 @@ def sensor_sets(rows: pd.DataFrame) -> list[tuple[str, ...]]:
     for names in sets:
         larger = [other for other in sets if set(names) < set(other)]
         told = len(on_it[names]) > 1 and all(on_it[names] != on_it[other] for other in larger)
-        if told or not larger:
+        if told or not larger or names == PRODUCTION:
             kept.append(names)
     real = [names for names in kept if on_it[names]]
     return real or kept

@@ -1,4 +1,4 @@
-"""Scenario names in, the plan that their board belongs to and the kind of road out.
+"""Scenario names in, the plan and setting that their board belongs to and the kind of road out.
 
 A board belongs to a plan: a suite, or what is left at one level of population. Rows outside a plan
 do not touch its boards.
@@ -37,6 +37,39 @@ def plan_of(scenario: str) -> str:
         return scenario
     level = scenario.partition("@")[2]
     return _plans().get(scenario) or (f"level {level}" if level else "")
+
+
+def level_of(scenario: str) -> int:
+    """Return the level of a scenario's population, 0 where it has none."""
+    level = scenario.partition("@")[2]
+    return int(level) if level.isdigit() and not scenario.startswith(PREFIX) else 0
+
+
+def setting_of(scenario: str) -> str:
+    """Return in words what cars a scenario has; empty for one outside the shipped suites."""
+    if scenario.startswith(PREFIX):
+        return "real vehicle"
+    level = level_of(scenario)
+    if level:
+        return "production spread" if level == 1 else f"wide spread, level {level}"
+    return "the papers' setting" if plan_of(scenario) else ""
+
+
+def standing(scenario: str) -> int:
+    """Return where the boards of a scenario stand among all: level 1 first, no spread last.
+
+    Without a spread a method is given the very car that it is tested on: that repeats a paper and
+    tells nothing of another car.
+    """
+    level = level_of(scenario)
+    if level:
+        return level
+    return 1_000 if scenario.startswith(PREFIX) else 1_001
+
+
+def standing_of(board: Any) -> int:
+    """Return where a board stands among all, see `standing`."""
+    return min(map(standing, board.scenarios), default=0)
 
 
 @cache

@@ -21,7 +21,8 @@ from gripbench.bench.publishing.figures.style import axis_scale
 from gripbench.bench.publishing.presentation import significant
 from gripbench.bench.publishing.tables import Column, Table
 from gripbench.bench.ranking.answers import words
-from gripbench.bench.ranking.plans import road_of
+from gripbench.bench.ranking.grids import opening
+from gripbench.bench.ranking.plans import road_of, standing_of
 from gripbench.bench.ranking.ranking import Board, boards
 from gripbench.bench.ranking.resolution import resolution
 from gripbench.bench.ranking.statistics import performance_profile
@@ -109,13 +110,18 @@ def rows_of_suites(rows: pd.DataFrame, suites: Sequence[str]) -> pd.DataFrame:
 
 
 def found_boards(rows: pd.DataFrame, targets: Sequence[str]) -> list[Board]:
-    """Return for each target the board of all methods and one for each set of instruments."""
+    """Return for each target the board of all methods and one for each set of instruments.
+
+    Boards of level 1 stand first and open with a production car's sensors; those
+    of the papers' setting stand last.
+    """
     found: list[Board] = []
     for target in targets:
         if (rows.loc[rows["target"] == target, "status"] == "skipped").all():
             continue
         found += boards(rows, target, "any")
         found += boards(rows, target)
+    found.sort(key=lambda board: (standing_of(board), opening(board.sensors) > 0))
     return found
 
 

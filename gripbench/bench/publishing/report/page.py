@@ -36,7 +36,8 @@ from gripbench.bench.publishing.report.content import (
 from gripbench.bench.publishing.report.critical import critical_differences
 from gripbench.bench.publishing.report.series import POINTS, SeriesPlan, all_series
 from gripbench.bench.ranking.answers import answers
-from gripbench.bench.ranking.plans import plan_of
+from gripbench.bench.ranking.plans import plan_of, setting_of
+from gripbench.bench.ranking.ranking import Board
 from gripbench.bench.ranking.summary import not_run
 from gripbench.bench.running.recorded_scenarios import at_hand
 from gripbench.bench.running.store import read_rows
@@ -155,16 +156,15 @@ def page(
     if len(absent) < rows["scenario"].nunique():
         rows = rows[~rows["scenario"].isin(absent)]
     found = found_boards(rows, targets)
-    whole = {board.target: board for board in found if not board.sensors}
+    whole: dict[str, Board] = {}  # the headline board of each target
+    for board in found:
+        if not board.sensors:
+            whole.setdefault(board.target, board)
     data = {
         "targets": {name: target_words(name) for name in targets},
         "methods": list(dict.fromkeys(rows["label"])),
         "maps": {name: heat_map(rows, name) for name in targets},
-        "fronts": {
-            board.target: points
-            for board in found
-            if not board.sensors and (points := front(board))
-        },
+        "fronts": {target: points for target, board in whole.items() if (points := front(board))},
         "profiles": {target: profile(board) for target, board in whole.items()},
         "series": series,
         "style": {
@@ -238,7 +238,9 @@ def _summary(rows: pd.DataFrame, targets: Sequence[str]) -> str:
 def _board(board: Any) -> str:
     sensors = ", ".join(board.sensors) or "any"
     plan = plan_of(board.scenarios[0]) if board.scenarios else ""
-    choice = f"{sensors} ({plan})" if plan else sensors
+    setting = setting_of(board.scenarios[0]) if board.scenarios else ""
+    marks = ", ".join(text for text in (plan, setting) if text)
+    choice = f"{sensors} ({marks})" if marks else sensors
     said, narrow, wide = shown_board(board)
     title = html.escape(board.title)
     return (
