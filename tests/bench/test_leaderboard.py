@@ -205,7 +205,9 @@ def test_rank_command_prints_boards_and_wins(stored):
     assert "mu_front with GPS receiver, accelerometer" in shown.output
     assert "wins in 12 runs" in shown.output
     lines = command("rank", "--results", stored, "--sensors", "any", "--format", "csv").output
-    assert [line.split(",")[0] for line in lines.splitlines()[1:]] == ["1", "2", "3", "4"]
+    table = list(csv.DictReader(lines.splitlines()))
+    assert [line["Rank"] for line in table] == ["1", "2", "3", "4"]
+    assert {line["Target"] for line in table} == {"mu_front"}
 
 
 def test_commands_rank_by_the_targets_of_the_suites_unless_told_otherwise(tmp_path):
