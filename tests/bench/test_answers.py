@@ -148,6 +148,7 @@ def test_level_one_and_its_production_cars_stand_first_and_the_papers_setting_la
 
 def test_more_sensors_that_give_a_larger_error_are_no_answer():
     """By score the larger set's method is first, by the error that is shown it is not."""
+
     def frame(on_the_hill):
         rms = {"a": (1.0, 1.0), "c": (3.0, 3.0), "b": (0.1, on_the_hill)}
         return frame_of([
