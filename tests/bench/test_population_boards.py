@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import gripbench
+from gripbench.envs.populations.draws import draw, paper_of
 from gripbench.envs.tyres.longitudinal import magic_formula, slip_ratio
 from gripbench.envs.worlds import load_scenario, record
 
@@ -91,33 +92,34 @@ def _score(frame, target):
     return np.exp(np.log(pooled).groupby("label").mean())
 
 
-def _memorisers(tmp_path, name, level):
+def _memorisers(tmp_path, names):
+    """Write a method that knows one drive of each scenario, and one that knows ten of each."""
     files = []
     for kind, seeds in (("memoriser", [1000]), ("recogniser", range(1000, 1010))):
         text = MEMORISER.replace("@NAME@", kind)
-        text = text.replace("@DRIVES@", _drives([f"{name}{level}"], seeds))
+        text = text.replace("@DRIVES@", _drives(names, seeds))
         path = tmp_path / f"{kind}.py"
         path.write_text(text)
         files.append(str(path))
     return files
 
 
-@pytest.mark.parametrize("name", LATERAL)
-def test_memory_of_other_seeds_is_no_better_than_the_best_baseline(name, tmp_path):
-    files = _memorisers(tmp_path, name, "@1")
+def test_memory_of_other_seeds_is_no_better_than_the_best_baseline(tmp_path):
+    names = [f"{name}@1" for name in LATERAL]
+    files = _memorisers(tmp_path, names)
     baselines = ["zero_sideslip", "bicycle_on_paper", "kinematic_integration"]
     frame = gripbench.run(
-        scenarios=[f"{name}@1"], methods=[*files, *baselines], seeds=6, workers=1,
-        results=tmp_path / "r",
-    )  # fmt: skip
-    score = _score(frame, "sideslip")
+        scenarios=names, methods=[*files, *baselines], seeds=6, workers=1, results=tmp_path / "r"
+    )
+    assert (frame["status"] == "ok").all()
+    score = _score(frame, "sideslip")  # one board: all scenarios that it was trained on
     best = score[score.index.isin(baselines)].min()
-    assert score["memoriser"] > best
-    assert score["recogniser"] > best
+    assert score["memoriser"] > best, score
+    assert score["recogniser"] > best, score
 
 
 def test_memory_would_pay_at_level_0(tmp_path):
-    files = _memorisers(tmp_path, "dakhlallah_hard", "")
+    files = _memorisers(tmp_path, ["dakhlallah_hard"])
     frame = gripbench.run(
         scenarios=["dakhlallah_hard"], methods=[*files, "zero_sideslip"], seeds=2, workers=1,
         results=tmp_path / "r",
@@ -165,3 +167,34 @@ def test_the_inverse_of_the_plant_solves_level_0():
         force += car["drag"] * seen["speed_gps"][k] ** 2
         errors.append(force / shape - 0.9)
     assert np.abs(errors).max() < 1e-9
+
+
+TELLS = """
+import json
+
+class Tells:
+    name = "tells"
+    sensors = ("yaw_rate",)
+    estimates = ("sideslip",)
+
+    def reset(self, vehicle, dt):
+        with open(@FILE@, "a") as file:
+            print(json.dumps(dict(vehicle)), file=file)
+
+    def update(self, obs):
+        return {"sideslip": 0.0}
+"""
+
+
+def test_a_plug_in_is_given_the_car_on_paper_for_every_seed(tmp_path):
+    told, plugin = tmp_path / "told", tmp_path / "tells.py"
+    plugin.write_text(TELLS.replace("@FILE@", repr(str(told))))
+    scenario = load_scenario("slalom_ice@1").model_copy(update={"horizon": 4.0})
+    frame = gripbench.run(
+        scenarios=[scenario], methods=[str(plugin)], seeds=2, workers=1, results=tmp_path / "r"
+    )
+    assert (frame["status"] == "ok").all()
+    given = [json.loads(line) for line in told.read_text().splitlines()]
+    assert given == [dict(paper_of(scenario))] * 2  # value by value, to the last bit
+    for seed in range(2):
+        assert draw(scenario, seed).road.values()["mass"] not in given[0].values()
