@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
+from gripbench.bench.scoring.metrics import metrics
 from gripbench.bench.scoring.metrics.convergence import BAND, HOLD
 from gripbench.bench.scoring.metrics.excitation import EXCITED
 from gripbench.bench.scoring.metrics.utilisation import UTILISATION_BANDS
@@ -98,6 +99,13 @@ def test_a_variance_that_is_not_positive_gives_no_consistency():
     values, names = estimates_of(np.ones(100), np.linspace(-1.0, 1.0, 100))
     found = score(values, names, ("mu_front",), a_recording(np.zeros(100)))
     assert not {"mean_nees", "crps", "sharpness", "coverage_90"} & set(found["mu_front"])
+
+
+@pytest.mark.parametrize("name", ["mean_nees", "crps", "coverage_90", "sharpness"])
+def test_a_method_cannot_choose_the_runs_in_which_its_variance_counts(name):
+    metric = metrics()[name]
+    assert metric.pooled([0.5, 0.7], [5.0, 7.0], [10, 10]) == pytest.approx(0.6)
+    assert np.isnan(metric.pooled([0.5, np.nan], [5.0, np.nan], [10, np.nan]))
 
 
 @pytest.mark.parametrize(

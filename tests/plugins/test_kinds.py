@@ -56,6 +56,9 @@ ROWS = {
     "unpickles_in_parent": ("failed", "the estimate 'mu_front' is Trap; return a number"),
     "state_in_class": ("ok", ""),
     "state_in_module": ("ok", ""),
+    "state_in_shared_memory": ("ok", ""),
+    "state_in_pipe": ("ok", ""),
+    "state_in_parent_memory": ("ok", ""),
     "draws": ("ok", ""),
     "knows_seed": ("ok", ""),
     "looks_ahead": ("ok", ""),
@@ -139,6 +142,16 @@ def test_some_kinds_give_their_row(tmp_path):
     # the second run's count would be 2 in a process that the first one left behind
     assert scores.loc["state_in_class"].nunique() == 1
     assert (rows["checked"] == "missing").all()
+
+
+@pytest.mark.parametrize(
+    "name", ["state_in_class", "state_in_shared_memory", "state_in_pipe", "state_in_parent_memory"]
+)
+def test_cells_of_one_process_share_nothing(name, tmp_path):
+    """Run alone, so that all its cells are forks of the same process."""
+    rows = _run([name], tmp_path, seeds=3)
+    assert (rows["status"] == "ok").all()
+    assert rows["rms"].nunique() == 1
 
 
 @pytest.mark.slow

@@ -50,13 +50,20 @@ def _limit_memory(memory: int) -> None:
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
-def _enter_landlock() -> None:
+def part_from_parent() -> None:
+    """Keep this process from the memory of the confined one that forked it (Linux)."""
+    if sys.platform == "linux":
+        with contextlib.suppress(OSError, AttributeError):
+            _enter_landlock(signals_too=False)
+
+
+def _enter_landlock(signals_too: bool = True) -> None:
     """Enter a domain of its own: the kernel then refuses to trace or signal what is outside."""
     library = ctypes.CDLL(None, use_errno=True)
     version = library.syscall(_CREATE_RULESET, None, ctypes.c_size_t(0), 1)
     if version < 1:
         return
-    scopes = _SCOPE_SIGNALS if version >= 6 else 0
+    scopes = _SCOPE_SIGNALS if version >= 6 and signals_too else 0
     # A ruleset has to handle something: making block devices, which no method does.
     attributes = struct.pack("=QQQ", _MAKE_BLOCK_DEVICE, 0, scopes)
     size = 24 if version >= 6 else 8

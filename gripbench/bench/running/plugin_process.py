@@ -37,7 +37,12 @@ from gripbench.bench.catalogue.declarations import (
     describe_error,
 )
 from gripbench.bench.running import audit
-from gripbench.bench.running.confinement import confine, end_children, end_with
+from gripbench.bench.running.confinement import (
+    confine,
+    end_children,
+    end_with,
+    part_from_parent,
+)
 from gripbench.bench.running.execution import (
     Observation,
     SkippedError,
@@ -190,6 +195,7 @@ def _serve_plugin(line: _Line, forks: bool) -> NoReturn:
     request = line.message()
     confine(request["memory"])
     audit.install()
+    before = _shared_by_forks()
     try:
         plugin = _load(request)
     except MemoryError:
@@ -198,6 +204,7 @@ def _serve_plugin(line: _Line, forks: bool) -> NoReturn:
         line.send({"status": "failed", "reason": describe_error(error)})
     else:
         shared = forks and threading.active_count() == 1 and _threads() == 1
+        shared = shared and _shared_by_forks() <= before
         line.send(
             {
                 "status": "ok",
@@ -220,6 +227,20 @@ def _threads() -> int:
         return len(os.listdir("/proc/self/task"))
     except OSError:
         return 2
+
+
+def _shared_by_forks() -> set[str]:
+    """Return what cells that are forked from here could tell each other through.
+
+    These are open files, pipes and connections, and memory that is mapped as shared.
+    """
+    try:
+        found = set(os.listdir("/proc/self/fd"))
+        with open("/proc/self/maps", "rb") as file:
+            mapped = [line.split(maxsplit=2)[:2] for line in file]
+    except OSError:
+        return set()
+    return found | {str(place) for place, rights in mapped if rights.startswith(b"rw-s")}
 
 
 def _load(request: dict[str, Any]) -> _Plugin:
@@ -286,6 +307,7 @@ def _fork_cells(line: _Line, plugin: _Plugin) -> NoReturn:
         if process == 0:
             control.close()
             end_with(parent)
+            part_from_parent()
             _serve_request(_Line(*descriptors), plugin, request)
         for descriptor in descriptors:
             os.close(descriptor)

@@ -118,6 +118,9 @@ class Metric:
     reached
         With `median`: name of the column with the share of runs whose value is finite; empty:
         none.
+    whole
+        Whether several runs have a value only where each has one: a method could otherwise choose
+        the runs that count.
     format
         Format specification of its numbers in tables.
     """
@@ -130,6 +133,7 @@ class Metric:
     unit: str = SIGNAL_UNIT
     reached: str = ""
     format: str = ".4g"
+    whole: bool = False
 
     def __post_init__(self) -> None:
         plain = self.name.replace("_", "a")
@@ -198,7 +202,7 @@ class Metric:
         """Return the value of several runs from what `columns` names; NaN where none has one."""
         first, *sums = (np.asarray(values, float) for values in columns)
         known = ~np.isnan(first)
-        if not known.any():
+        if not known.any() or (self.whole and not known.all()):
             return math.nan
         if self.summed:
             totals, counts = sums[0][known], sums[1][known]

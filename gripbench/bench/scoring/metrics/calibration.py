@@ -1,7 +1,8 @@
 """Errors of one run and the method's own variance into scores of its uncertainty.
 
 The stated distribution is normal with the method's variance. A method without a variance, or with
-one that is not positive and finite throughout, has none of these values: no pass, no failure.
+one that is not positive and finite throughout, has none of these values: no pass, no failure. Nor
+has it any over several runs of which one has none, so that no method leaves its worst runs out.
 
 References
 ----------
@@ -30,7 +31,8 @@ def normalised_squares(
     if context.deviation is None or context.variance is None:
         return None
     error = estimate - truth
-    total = running_total(error * error / context.variance)
+    with np.errstate(over="ignore"):  # a variance next to nothing: no finite value
+        total = running_total(error * error / context.variance)
     return (total, len(error)) if math.isfinite(total) else None
 
 
@@ -44,7 +46,8 @@ def crps(
     from scipy.special import ndtr
 
     z = np.abs(estimate - truth) / deviation
-    density = np.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi)
+    with np.errstate(over="ignore"):
+        density = np.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi)
     scores = deviation * (z * (2.0 * ndtr(z) - 1.0) + 2.0 * density - 1.0 / math.sqrt(math.pi))
     return running_total(scores), len(scores)
 
@@ -87,8 +90,15 @@ METRICS = (
         "mean",
         "-",
         format=".3g",
+        whole=True,
     ),
-    Metric("crps", "CRPS", "Continuous ranked probability score of the stated variance", crps),
+    Metric(
+        "crps",
+        "CRPS",
+        "Continuous ranked probability score of the stated variance",
+        crps,
+        whole=True,
+    ),
     *(
         Metric(
             f"coverage_{100 * level:.0f}",
@@ -98,8 +108,9 @@ METRICS = (
             "mean",
             "-",
             format=".3f",
+            whole=True,
         )
         for level in LEVELS
     ),
-    Metric("sharpness", "Sharpness", "Mean width of the stated 90 % interval", width),
+    Metric("sharpness", "Sharpness", "Mean width of the stated 90 % interval", width, whole=True),
 )
