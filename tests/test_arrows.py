@@ -50,6 +50,7 @@ FLOORS = (
     ("bench.running", "bench.catalogue.check", "bench.catalogue.expectations"),
     ("bench.ranking",),
     (
+        "bench.publishing.columns",
         "bench.publishing.tables",
         "bench.publishing.latex",
         "bench.publishing.figures",

@@ -14,9 +14,10 @@ from typer.testing import CliRunner
 
 import gripbench
 from gripbench.bench.command_line import application
+from gripbench.bench.publishing.columns import Column, Table
 from gripbench.bench.publishing.figures.runs import Runs
 from gripbench.bench.publishing.report import content, page, series
-from gripbench.bench.publishing.tables import Column, Table, csv
+from gripbench.bench.publishing.tables import csv
 from gripbench.bench.running.rows import frame_of
 from gripbench.envs.worlds import load_scenario, record
 from gripbench.errors import InputError

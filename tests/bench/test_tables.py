@@ -11,7 +11,7 @@ import pytest
 
 from gripbench.bench.papers.comparison import portable
 from gripbench.bench.publishing import latex, tables
-from gripbench.bench.publishing.tables import Column, Table
+from gripbench.bench.publishing.columns import MISSING, Column, Table
 from gripbench.errors import InputError
 
 COLUMNS = (
@@ -89,7 +89,7 @@ def test_markdown_reads_back(table):
         for line in cells[2:]
     ]
     assert plain[0] == ["a_b & c", "one|two", "1.23", "50.0", "3"]
-    assert plain[1][2:4] == ["1.23", tables.MISSING]
+    assert plain[1][2:4] == ["1.23", MISSING]
     bold = {(i, j) for i, line in enumerate(cells[2:]) for j, c in enumerate(line) if "**" in c}
     assert bold == {(0, 2), (1, 2), (3, 2), (0, 3), (4, 3)}
 
@@ -164,7 +164,7 @@ def test_frame_values_of_numpy_become_cells():
     columns = (Column("n", "N", format="d"), Column("x", "X", format=".2f"), Column("flag", "F"))
     table = Table.from_frame(frame, columns)
     assert tables.csv(table) == "N,X,F\n1,1.5,true\n2,,false\n"
-    assert [table.text(1, column) for column in columns] == ["2", tables.MISSING, "no"]
+    assert [table.text(1, column) for column in columns] == ["2", MISSING, "no"]
 
 
 def test_unknown_format_names_the_nearest(table, tmp_path):

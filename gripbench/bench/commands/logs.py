@@ -13,7 +13,7 @@ import typer
 from gripbench.bench.commands import LOGS
 
 if TYPE_CHECKING:
-    from gripbench.bench.publishing.tables import Table
+    from gripbench.bench.publishing.columns import Table
     from gripbench.bench.running.recorded import RecordedScore
 
 
@@ -212,7 +212,7 @@ def identify(
 
 
 def _table(scores: list[RecordedScore]) -> Table:
-    from gripbench.bench.publishing.tables import Column, Table
+    from gripbench.bench.publishing.columns import Column, Table
 
     rows = [
         {

@@ -10,6 +10,7 @@ from rich.progress import Progress
 
 from gripbench.bench.papers.reproduction import Reproduction, reproduction_of
 from gripbench.bench.publishing import tables
+from gripbench.bench.publishing.columns import Table
 from gripbench.bench.publishing.manifest import manifest, write_manifest
 from gripbench.errors import GripbenchError
 from gripbench.writing import write_atomically
@@ -72,7 +73,7 @@ def _write(directory: Path, result: Reproduction) -> list[Path]:
     return [directory / name for name in content]
 
 
-def portable(table: tables.Table) -> tables.Table:
+def portable(table: Table) -> Table:
     """Return a table with the digits of its numbers that are the same on every machine.
 
     Processors round differently; a file that is published must come out again elsewhere.

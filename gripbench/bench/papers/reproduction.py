@@ -22,7 +22,7 @@ from gripbench.bench.papers.claims import (
     judge,
     paper_files,
 )
-from gripbench.bench.publishing.tables import Column, Table
+from gripbench.bench.publishing.columns import Column, Table
 from gripbench.configuration import Configuration
 from gripbench.errors import unknown
 from gripbench.extensions import entry_points, load

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from gripbench.bench.publishing.tables import Column, Table
+from gripbench.bench.publishing.columns import Column, Table
 from gripbench.bench.publishing.timings import RelativeRuntime
 from gripbench.bench.ranking.answers import Answer
 from gripbench.bench.ranking.ranking import Board

@@ -14,7 +14,8 @@ from functools import cache
 from pathlib import Path
 
 import gripbench
-from gripbench.bench.publishing.tables import Column, Table, markdown
+from gripbench.bench.publishing.columns import Column, Table
+from gripbench.bench.publishing.tables import markdown
 
 PAPERS = {
     "Li, Du & Li (2014)": re.compile(r"Li, Du & Li \(2014\)"),

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 from pydantic import Field
 
+from gripbench.bench.publishing.columns import Column, Table
 from gripbench.bench.publishing.leaderboard import Leaderboard, Runs
-from gripbench.bench.publishing.tables import Column, Table
 from gripbench.bench.scoring.metric import pooled_rms
 from gripbench.configuration import Configuration, parse
 from gripbench.errors import InputError

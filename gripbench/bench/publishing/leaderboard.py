@@ -19,7 +19,8 @@ from pydantic import Field
 import gripbench
 from gripbench.bench.catalogue.registry import load_suite, suite_files
 from gripbench.bench.publishing.board_tables import Timings, answer_table, board_table
-from gripbench.bench.publishing.tables import Table, markdown
+from gripbench.bench.publishing.columns import Table
+from gripbench.bench.publishing.tables import markdown
 from gripbench.bench.publishing.timings import RelativeRuntime
 from gripbench.bench.ranking.answers import Answer, answers, words
 from gripbench.bench.ranking.grids import ANY, opening

@@ -9,9 +9,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from gripbench.bench.catalogue.registry import built_in_methods
+from gripbench.bench.publishing.columns import Column, Table
 from gripbench.bench.publishing.leaderboard import Leaderboard, read
 from gripbench.bench.publishing.presentation import significant
-from gripbench.bench.publishing.tables import Column, Table, markdown
+from gripbench.bench.publishing.tables import markdown
 from gripbench.bench.ranking.summary import FOOTNOTE, MARK
 from gripbench.bench.scoring.metric import pooled_rms
 from gripbench.envs.signals import signal

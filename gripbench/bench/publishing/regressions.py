@@ -15,8 +15,8 @@ from typing import Literal
 
 import numpy as np
 
+from gripbench.bench.publishing.columns import Column, Table
 from gripbench.bench.publishing.leaderboard import Leaderboard, Runs
-from gripbench.bench.publishing.tables import Column, Table
 from gripbench.bench.publishing.timings import RelativeRuntime
 from gripbench.bench.ranking.statistics import CONFIDENCE, holm, mean_log_rms, p_better
 from gripbench.errors import InputError

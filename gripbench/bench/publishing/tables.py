@@ -1,10 +1,7 @@
-"""One description of a table, rendered for the terminal, Markdown, CSV, LaTeX and HTML.
+"""A table in, its text for the terminal, Markdown, CSV, LaTeX and HTML out.
 
-A table says what its columns are (title, unit, format, which value is best) and holds plain
-values; how they look is the renderer's matter. CSV keeps full precision, all others show the
-column's format. The best value of a column, within its group of rows, is bold, and every value
-that ties with it too: by default those that read the same as shown, or, where the caller knows
-more, those that a flag marks (statistical ties of a ranking).
+What a table is stands in `gripbench.bench.publishing.columns`. CSV keeps full precision, all
+others show the column's format; the best values are bold.
 """
 
 from __future__ import annotations
@@ -12,166 +9,27 @@ from __future__ import annotations
 import csv as csv_format
 import html as html_format
 import io
-import math
 import numbers
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
-import pandas as pd
 import rich.box
 import rich.table
 import rich.text
 from rich.console import Console
 
+from gripbench.bench.publishing.columns import (
+    Column,
+    Table,
+    is_missing,
+    is_number,
+    is_numeric,
+)
 from gripbench.bench.publishing.latex import latex_line, latex_number, latex_text
-from gripbench.errors import InputError, nearest, one_line, unknown
-
-MISSING = "–"
-"""What a renderer shows where there is no value; CSV leaves the cell empty."""
-
-
-@dataclass(frozen=True)
-class Column:
-    """One column.
-
-    Attributes
-    ----------
-    key
-        Name of the value in each row.
-    title
-        Heading without unit.
-    unit
-        Unit, shown in brackets behind the title; empty: none.
-    format
-        Format specification of numbers as `format()` takes it, such as `.3g`; text is shown as
-        it is.
-    best
-        Which number of the column is the best one; empty: none.
-    tied
-        Name of a boolean in each row that says whether its value shares the best one's mark;
-        empty: those that read the same as the best.
-    """
-
-    key: str
-    title: str
-    unit: str = ""
-    format: str = ""
-    best: Literal["", "lowest", "highest"] = ""
-    tied: str = ""
-
-    @property
-    def heading(self) -> str:
-        """Title with unit."""
-        return f"{self.title} [{self.unit}]" if self.unit else self.title
-
-
-@dataclass(frozen=True)
-class Table:
-    """A table: its columns and rows.
-
-    Attributes
-    ----------
-    columns
-        Columns from left to right.
-    rows
-        One mapping a row with a value for each column's key: number, text, boolean, or None
-        where there is none (NaN counts as none).
-    caption
-        What the table shows, one sentence; empty: none.
-    notes
-        Remarks below the table.
-    group_by
-        Key of a column: consecutive rows with the same value form a group; the best is sought
-        within each group and a rule divides them. Empty: one group.
-
-    Raises
-    ------
-    InputError
-        If a row lacks a value or there are two columns with one key.
-    """
-
-    columns: tuple[Column, ...]
-    rows: tuple[Mapping[str, Any], ...]
-    caption: str = ""
-    notes: tuple[str, ...] = ()
-    group_by: str = ""
-    _groups: tuple[range, ...] = field(init=False, repr=False, compare=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "columns", tuple(self.columns))
-        object.__setattr__(self, "rows", tuple(self.rows))
-        object.__setattr__(self, "notes", tuple(self.notes))
-        keys = [column.key for column in self.columns]
-        if len(set(keys)) != len(keys):
-            raise InputError(f"table: a column occurs twice among {', '.join(keys)}")
-        needed = {*keys, *(column.tied for column in self.columns), self.group_by} - {""}
-        for index, row in enumerate(self.rows):
-            for key in needed - row.keys():
-                raise InputError(f"table: row {index} has no '{key}': {nearest(key, row)}")
-        object.__setattr__(self, "_groups", tuple(_groups(self.rows, self.group_by)))
-
-    @classmethod
-    def from_frame(
-        cls,
-        frame: pd.DataFrame,
-        columns: Iterable[Column],
-        caption: str = "",
-        notes: Iterable[str] = (),
-        group_by: str = "",
-    ) -> Table:
-        """Return the rows of a frame as a table; the frame may have more columns."""
-        rows = tuple({str(k): v for k, v in row.items()} for row in frame.to_dict("records"))
-        return cls(tuple(columns), rows, caption, tuple(notes), group_by)
-
-    @property
-    def groups(self) -> tuple[range, ...]:
-        """Indices of the rows of each group."""
-        return self._groups
-
-    def text(self, row: int, column: Column) -> str:
-        """Return a cell as shown, `MISSING` where there is no value."""
-        value = self.rows[row][column.key]
-        if is_missing(value):
-            return MISSING
-        if isinstance(value, bool | np.bool_):
-            return "yes" if value else "no"
-        if isinstance(value, numbers.Real):
-            return _without_exponent(format(value, column.format), float(value))
-        return str(value)
-
-    def best(self) -> frozenset[tuple[int, str]]:
-        """Return the cells that are best, as (index of the row, key of the column)."""
-        cells: set[tuple[int, str]] = set()
-        for column in self.columns:
-            if column.best:
-                for group in self.groups:
-                    cells.update((row, column.key) for row in self._best_rows(column, group))
-        return frozenset(cells)
-
-    def _best_rows(self, column: Column, group: range) -> list[int]:
-        rows = [row for row in group if _is_number(self.rows[row][column.key])]
-        if not rows:
-            return []
-        choose = min if column.best == "lowest" else max
-        best = choose(rows, key=lambda row: self.rows[row][column.key])
-        if column.tied:
-            return [row for row in rows if row == best or bool(self.rows[row][column.tied])]
-        shown = self.text(best, column)
-        return [row for row in rows if self.text(row, column) == shown]
-
-
-def _without_exponent(text: str, value: float) -> str:
-    """Return a number in full where rounding to a few digits gave it an exponent for nothing."""
-    return f"{float(text):.0f}" if "e+" in text and abs(value) < 1e7 else text
-
-
-def is_missing(value: Any) -> bool:
-    """Return whether a cell has no value: None, NaN or pandas' NA."""
-    return value is None or value is pd.NA or (isinstance(value, float) and math.isnan(value))
+from gripbench.errors import one_line, unknown
 
 
 def terminal(table: Table) -> rich.table.Table:
@@ -186,8 +44,8 @@ def terminal(table: Table) -> rich.table.Table:
     for column in table.columns:
         shown.add_column(
             rich.text.Text(one_line(column.heading)),
-            justify="right" if _is_numeric(table, column) else "left",
-            no_wrap=_is_numeric(table, column),
+            justify="right" if is_numeric(table, column) else "left",
+            no_wrap=is_numeric(table, column),
         )
     best = table.best()
     for group in table.groups:
@@ -215,7 +73,7 @@ def plain(table: Table) -> str:
             ]
         )
     widths = [max(len(line[j]) for line in cells) for j in range(len(table.columns))]
-    right = [_is_numeric(table, column) for column in table.columns]
+    right = [is_numeric(table, column) for column in table.columns]
     lines = [
         "  ".join(
             text.rjust(width) if numeric else text.ljust(width)
@@ -237,7 +95,7 @@ def markdown(table: Table) -> str:
     lines = [
         "| " + " | ".join(_markdown(column.heading) for column in table.columns) + " |",
         "|"
-        + "|".join("---:" if _is_numeric(table, column) else "---" for column in table.columns)
+        + "|".join("---:" if is_numeric(table, column) else "---" for column in table.columns)
         + "|",
     ]
     for row in range(len(table.rows)):
@@ -273,7 +131,7 @@ def latex(table: Table, standalone: bool = False) -> str:
         `\usepackage{booktabs}` where it is included.
     """
     best = table.best()
-    alignment = "".join("r" if _is_numeric(table, column) else "l" for column in table.columns)
+    alignment = "".join("r" if is_numeric(table, column) else "l" for column in table.columns)
     lines = [r"\begin{table}[htbp]", r"\centering"]
     if table.caption:
         lines.append(rf"\caption{{{latex_text(table.caption)}}}")
@@ -287,7 +145,7 @@ def latex(table: Table, standalone: bool = False) -> str:
             cells = []
             for column in table.columns:
                 text = table.text(row, column)
-                number_shown = _is_number(table.rows[row][column.key])
+                number_shown = is_number(table.rows[row][column.key])
                 text = latex_number(text) if number_shown else latex_text(text)
                 if (row, column.key) in best:
                     text = rf"\textbf{{\boldmath {text}}}"
@@ -318,7 +176,7 @@ def html(table: Table) -> str:
         lines.append(f"<caption>{html_format.escape(table.caption)}</caption>")
     lines.append("<thead><tr>")
     for column in table.columns:
-        name = "number" if _is_numeric(table, column) else "text"
+        name = "number" if is_numeric(table, column) else "text"
         heading = html_format.escape(column.heading)
         lines.append(f'<th scope="col" class="{name}" data-key="{column.key}">{heading}</th>')
     lines.append("</tr></thead>")
@@ -397,25 +255,6 @@ def format_of(path: Path) -> str:
     return _SUFFIXES[path.suffix]
 
 
-def _groups(rows: Sequence[Mapping[str, Any]], key: str) -> Iterable[range]:
-    first = 0
-    for index in range(1, len(rows) + 1):
-        if index == len(rows) or (key and rows[index][key] != rows[first][key]):
-            yield range(first, index)
-            first = index
-
-
-def _is_number(value: Any) -> bool:
-    number = isinstance(value, numbers.Real) and not isinstance(value, bool | np.bool_)
-    return number and not is_missing(value)
-
-
-def _is_numeric(table: Table, column: Column) -> bool:
-    """Whether a column holds numbers only; an empty one counts by its format."""
-    values = [row[column.key] for row in table.rows if not is_missing(row[column.key])]
-    return all(map(_is_number, values)) if values else bool(column.format)
-
-
 def _csv(value: Any) -> str:
     if is_missing(value):
         return ""
@@ -435,9 +274,9 @@ def _html_cell(table: Table, row: int, column: Column, best: bool) -> str:
     value = table.rows[row][column.key]
     text = html_format.escape(table.text(row, column))
     attributes = f' data-key="{html_format.escape(column.key)}"'
-    if _is_numeric(table, column):
+    if is_numeric(table, column):
         names = "number best" if best else "number"
         attributes += f' class="{names}"'
-    if _is_number(value):
+    if is_number(value):
         attributes += f' data-value="{float(value)!r}"'
     return f"<td{attributes}>{f'<strong>{text}</strong>' if best else text}</td>"

@@ -25,17 +25,15 @@ from gripbench.bench.ranking.grids import (
     Grid,
     chosen_instruments,
     grid_of,
-    instruments,
     on_board,
     sensor_sets,
 )
+from gripbench.bench.ranking.method_lines import Settings, method_line
 from gripbench.bench.ranking.pareto import pareto_front
 from gripbench.bench.ranking.plans import plan_of
 from gripbench.bench.ranking.resolution import resolution
 from gripbench.bench.ranking.skill import against_guess, best_baseline
-from gripbench.bench.ranking.summary import outside_of
 from gripbench.bench.running.recorded_scenarios import PREFIX
-from gripbench.bench.scoring.metric import Metric, pooled_rms
 from gripbench.bench.scoring.metrics import metrics
 from gripbench.errors import InputError, unknown
 
@@ -191,7 +189,7 @@ def boards(
             raise unknown("target", name, known)
     if not known:
         raise InputError("nothing to rank: no row has a target; run a method first")
-    settings = _Settings(reference, confidence, resamples, seed)
+    settings = Settings(reference, confidence, resamples, seed)
     given = None if sensors == ANY else chosen_instruments(sensors)
     found = []
     for name in [name for name in targets if name] or sorted(known):
@@ -206,14 +204,6 @@ def boards(
     return found
 
 
-@dataclass(frozen=True)
-class _Settings:
-    reference: str
-    confidence: float
-    resamples: int
-    seed: int
-
-
 def _only(rows: pd.DataFrame, column: str, chosen: Iterable[str]) -> pd.DataFrame:
     names = [chosen] if isinstance(chosen, str) else list(chosen)
     known = set(rows[column])
@@ -224,7 +214,7 @@ def _only(rows: pd.DataFrame, column: str, chosen: Iterable[str]) -> pd.DataFram
 
 
 def _board(
-    grid: Grid, allowed: tuple[str, ...] | None, one_of_several: bool, settings: _Settings
+    grid: Grid, allowed: tuple[str, ...] | None, one_of_several: bool, settings: Settings
 ) -> Board:
     target = grid.target
     scenarios = tuple(sorted((*grid.scenarios, *grid.single)))
@@ -235,7 +225,7 @@ def _board(
     ranks, p_better = _ranks(grid, settings)
     lines = pd.DataFrame(
         [
-            {**_summary(group, str(label) in grid.labels, settings), **ranks[str(label)]}
+            {**method_line(group, str(label) in grid.labels, settings), **ranks[str(label)]}
             for label, group in grid.rows.groupby("label")
         ]
     )
@@ -270,7 +260,7 @@ def _board(
     )
 
 
-def _ranks(grid: Grid, settings: _Settings) -> tuple[dict[str, dict[str, Any]], pd.DataFrame]:
+def _ranks(grid: Grid, settings: Settings) -> tuple[dict[str, dict[str, Any]], pd.DataFrame]:
     """Return rank, interval, group and score of each method, and the adjusted p-values."""
     labels = grid.labels
     by_label: dict[str, dict[str, Any]] = {}
@@ -331,7 +321,7 @@ def _places(estimate: npt.NDArray[np.float64], order: npt.NDArray[np.int64]) -> 
 
 
 def _relative(
-    scores: statistics.Scores, labels: tuple[str, ...], settings: _Settings
+    scores: statistics.Scores, labels: tuple[str, ...], settings: Settings
 ) -> tuple[npt.NDArray[np.float64], ...]:
     """Return scores relative to the reference with the ends of both their intervals.
 
@@ -351,59 +341,3 @@ def _relative(
     scatter = each.std(axis=0, ddof=1) / np.sqrt(number) if number > 1 else np.zeros_like(relative)
     far = statistics.interval(relative, scatter, number, settings.confidence)
     return tuple(np.exp(values) for values in (relative, low, high, *far))
-
-
-def _summary(group: pd.DataFrame, complete: bool, settings: _Settings) -> dict[str, Any]:
-    """Return what a method did over its runs on the board; no scores unless it finished all."""
-    first = group.iloc[0]
-    good = group[group["status"] == "ok"]
-    bad = group[group["status"] != "ok"]
-    by_seed = good.groupby("seed")[["sum_of_squares", "count"]].sum()
-    low, high = statistics.pooled_rms_interval(
-        by_seed["sum_of_squares"] if complete else [],
-        by_seed["count"] if complete else [],
-        settings.confidence,
-        settings.resamples,
-        settings.seed,
-    )
-    line: dict[str, Any] = {
-        name: first[name]
-        for name in ("label", "method", "variant", "title", "idealised", "baseline")
-    }
-    line |= {
-        "computed_outside": bool(outside_of(group).any()),
-        "reads": ", ".join(instruments(first["sensors"])),
-        "rms": pooled_rms(good["sum_of_squares"], good["count"]) if complete else np.nan,
-        "rms_from": low,
-        "rms_to": high,
-        "step_batch": good["step_batch"].astype(float).median(),
-        "step_p50": good["step_p50"].astype(float).median(),
-        "step_p99": good["step_p99"].astype(float).median(),
-        "step_max": good["step_max"].astype(float).max(),
-        "deadline_misses": good["deadline_misses"].astype(float).mean(),
-        "reason": "" if complete else _reason(bad),
-    }
-    for metric in metrics().values():
-        if metric.name != "rms":
-            line |= _pooled(metric, good if complete else good.iloc[:0])
-    return line
-
-
-def _pooled(metric: Metric, good: pd.DataFrame) -> dict[str, float]:
-    """Return a metric over the runs of a method, and in which share of them it is reached."""
-    if not set(metric.columns) <= set(good):  # rows of a frame that was read without the metric
-        good = good.iloc[:0].reindex(columns=list(metric.columns))
-    values = [good[name].to_numpy(float) for name in metric.columns]
-    found = {metric.name: metric.pooled(*values)}
-    if metric.reached:
-        known = values[0][~np.isnan(values[0])]
-        found[metric.reached] = float(np.isfinite(known).mean()) if len(known) else np.nan
-    return found
-
-
-def _reason(bad: pd.DataFrame) -> str:
-    """Return the most frequent status and reason of the failures."""
-    if bad.empty:
-        return "not run in every scenario"
-    texts = bad["status"].astype(str) + ": " + bad["reason"].astype(str)
-    return str(texts.value_counts(sort=True).index[0]).removesuffix(": ")

@@ -18,7 +18,7 @@ from gripbench.bench.catalogue.registry import built_in_methods
 from gripbench.bench.papers.li2014 import evidence_figures as figures
 from gripbench.bench.papers.li2014 import tables as paper_tables
 from gripbench.bench.papers.li2014.tables import MethodColumn, Outcome, RecordingMethod
-from gripbench.bench.publishing import tables
+from gripbench.bench.publishing.columns import Column, Table
 from gripbench.envs.instruments.sensors import SensorSuite
 from gripbench.envs.plants.longitudinal.world import LongitudinalScenario, LongitudinalSimulation
 from gripbench.envs.recordings import Recording
@@ -324,9 +324,7 @@ def changes(seeds: int) -> tuple[Change, ...]:
     )  # fmt: skip
 
 
-def evidence(
-    paper: paper_tables.PaperTables, advance: Callable[[], None] = lambda: None
-) -> tables.Table:
+def evidence(paper: paper_tables.PaperTables, advance: Callable[[], None] = lambda: None) -> Table:
     """Return the table: one row a change, with what becomes of the cells.
 
     Parameters
@@ -358,15 +356,15 @@ def evidence(
         rows.append(row)
         advance()
     _named.cache_clear()
-    return tables.Table(
+    return Table(
         columns=(
-            tables.Column("item", "Item"),
-            tables.Column("alternative", "Alternative"),
-            tables.Column("IV_matches", "IV: cells"),
-            tables.Column("IV_mean", "IV: mean |ln|", "", ".2f"),
-            tables.Column("V_matches", "V: cells"),
-            tables.Column("V_mean", "V: mean |ln|", "", ".2f"),
-            tables.Column("figure", "Figure"),
+            Column("item", "Item"),
+            Column("alternative", "Alternative"),
+            Column("IV_matches", "IV: cells"),
+            Column("IV_mean", "IV: mean |ln|", "", ".2f"),
+            Column("V_matches", "V: cells"),
+            Column("V_mean", "V: mean |ln|", "", ".2f"),
+            Column("figure", "Figure"),
         ),
         rows=tuple(rows),
         caption="Li, Du & Li (2014): cells within a factor of 2 of the published value, of 30 in "

@@ -11,7 +11,7 @@ import numpy as np
 from gripbench.bench.papers.li2014 import tables as paper_tables
 from gripbench.bench.papers.li2014.tables import MethodColumn, Outcome, PaperTables
 from gripbench.bench.papers.reproduction import Progress, Reproduction
-from gripbench.bench.publishing.tables import Column, Table
+from gripbench.bench.publishing.columns import Column, Table
 from gripbench.envs.signals import signal
 from gripbench.envs.worlds import load_scenario
 

@@ -17,9 +17,9 @@ import pandas as pd
 from gripbench.bench.catalogue.registry import load_suite, suite_files
 from gripbench.bench.papers.claims import paper_files
 from gripbench.bench.publishing.board_tables import board_table
+from gripbench.bench.publishing.columns import Column, Table
 from gripbench.bench.publishing.figures.style import axis_scale
 from gripbench.bench.publishing.presentation import significant
-from gripbench.bench.publishing.tables import Column, Table
 from gripbench.bench.ranking.answers import words
 from gripbench.bench.ranking.grids import opening
 from gripbench.bench.ranking.plans import road_of, standing_of
