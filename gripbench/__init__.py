@@ -38,6 +38,8 @@ if TYPE_CHECKING:
         Variant,
         compiled,
     )
+    from gripbench.methods.foreign.program import Program
+    from gripbench.methods.foreign.shared_library import SharedLibrary
 
 # numba's cache must see edits of what a function calls, see gripbench.compiled_cache
 _LOCATORS = (
@@ -56,6 +58,8 @@ DEFINED_IN = {
     "CompiledMethod": "gripbench.methods.contract",
     "Estimator": "gripbench.methods.contract",
     "Parameter": "gripbench.methods.contract",
+    "Program": "gripbench.methods.foreign.program",
+    "SharedLibrary": "gripbench.methods.foreign.shared_library",
     "Variant": "gripbench.methods.contract",
     "check_estimator": "gripbench.bench.catalogue.check",
     "compiled": "gripbench.methods.contract",
@@ -73,6 +77,8 @@ __all__ = [
     "CompiledMethod",
     "Estimator",
     "Parameter",
+    "Program",
+    "SharedLibrary",
     "Variant",
     "check_estimator",
     "compiled",

@@ -1,0 +1,1 @@
+"""Methods whose mathematics is not Python: a shared library, a program."""
