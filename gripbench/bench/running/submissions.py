@@ -157,7 +157,7 @@ def _declaration(
             raise InputError(f"{path}: column '{item}{VARIANCE}' stands without '{item}'")
     if not estimates:
         raise InputError(f"{path}: holds no estimate; add a column for each signal")
-    given = {
+    given: dict[str, Any] = {
         "name": name, "title": title or None, "sensors": channels, "estimates": estimates,
         "variances": variances, "settings": {}, "variant": "",
     }  # fmt: skip
