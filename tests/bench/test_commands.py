@@ -120,7 +120,9 @@ def test_new_method_writes_one_that_passes_and_runs(compiled, tmp_path, short_sc
     extra = ["--compiled"] if compiled else []
     text_of("new", "method", "my_filter", "--folder", str(tmp_path), *extra)
     path = f"{tmp_path}/my_filter.py:MyFilter"
-    assert "15 of 15" in text_of("check", path, "--scenario", "constant_mu")
+    printed = text_of("check", path, "--scenario", "constant_mu")
+    assert "of 16 checks" in printed
+    assert "FAILED" not in printed
     printed = text_of("run", "--scenario", short_scenario, "--method", path, "--workers", "1",
                       "--results", str(tmp_path / "r"))  # fmt: skip
     assert "1 cells (1 ok)" in printed

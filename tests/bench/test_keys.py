@@ -92,7 +92,7 @@ def test_rows_of_two_versions_of_a_scenario_share_no_board(plan, tmp_path):
     )
     run_plan(changed, Store(tmp_path), Backend(workers=1))
     with pytest.raises(InputError, match="rows of 'short' come from 2 versions of the scenario"):
-        rank(read_rows(tmp_path), target="mu_front")
+        rank(read_rows(tmp_path), target="mu_front", sensors="any")
     run_plan(
         dataclasses.replace(changed, methods=plan.methods), Store(tmp_path), Backend(workers=1)
     )

@@ -113,7 +113,7 @@ def test_editing_a_shared_file_runs_its_users_again_and_nothing_else(plan, plugi
         run(
             Plan(plan.scenarios, methods, range(1)),
             tmp_path / "r",
-            on_row=lambda row: ran.append((row.label, row.scores["mu_front"].bias)),
+            on_row=lambda row: ran.append((row.label, row.scores["mu_front"]["bias"].value)),
         )
         return dict(ran)
 

@@ -153,7 +153,8 @@ class FrictionTwin:
     """The friction filter around filterpy."""
 
     def __init__(self, vehicle, settings):
-        names = (*VelocityFrictionEkf.vehicle_parameters, *settings)
+        own = [name for name, value in settings.items() if not isinstance(value, str)]
+        names = (*VelocityFrictionEkf.vehicle_parameters, *own)
         values = tuple((settings | vehicle)[name] for name in names)
         self.params = np.array([values], [(name, np.float64) for name in names])[0]
         self.settings = settings

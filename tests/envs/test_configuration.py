@@ -42,7 +42,7 @@ def test_not_toml(tmp_path, content):
 
 
 def test_a_folder_is_not_a_file(tmp_path):
-    with pytest.raises(InputError, match="cannot be read as text"):
+    with pytest.raises(InputError, match="is no plain file"):
         read_toml(tmp_path)
 
 

@@ -126,7 +126,7 @@ def _continuous(scenario):
         def inputs_at(t, end=end):
             at = min(t, end - 1e-12)
             values = [profile_value(at, profile) for profile in profiles]
-            inputs[0] = (*values, values[2], scenario.road_grade)
+            inputs[0] = (*values, values[2], scenario.road_grade, 0.0)
             return inputs[0]
 
         inside = (times > begin + 1e-9) & (times <= end + 1e-9)

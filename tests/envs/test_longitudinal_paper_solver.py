@@ -126,8 +126,8 @@ def test_a_tight_tolerance_removes_the_ringing(monkeypatch):
         held = truth["time"] > 1.2
         return (truth["force_x_front"] - exact)[held]
 
-    def uncompiled(x0, *arguments):
-        return solver.paper_solver.py_func(x0, *arguments)
+    def uncompiled(x0, carry, *arguments):
+        return solver.paper_solver.py_func(x0, carry.view(np.recarray), *arguments)
 
     loose = front_force_error()
     assert loose.mean() < -30.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -23,7 +24,7 @@ class _WithFaults(TyperCommand):
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Give `--faults` the value `all` where none follows it."""
         filled: list[str] = []
-        for word, following in zip(args, [*args[1:], "-"], strict=True):
+        for word, following in pairwise([*args, "-"]):
             filled.append(word)
             if word == "--faults" and following.startswith("-"):
                 filled.append("all")
