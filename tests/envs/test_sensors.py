@@ -57,6 +57,8 @@ def test_drawn_bias_and_scale_over_seeds():
     scales = [_observe(sensor, truth, seed)["speed_x"][1] for seed in range(1500)]
     assert np.mean(scales) == pytest.approx(1.1, abs=0.003)
     assert np.std(scales) == pytest.approx(0.02, rel=0.08)
+    own = np.corrcoef(biases, scales)[0, 1]  # of the same seeds: the draws are independent
+    assert abs(own) < 4.0 / np.sqrt(1500)
 
 
 def test_bias_walk_grows_with_the_root_of_time():

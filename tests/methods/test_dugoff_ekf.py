@@ -111,6 +111,11 @@ def test_agrees_with_filterpy(run):
     for i, name in enumerate(STATES):
         np.testing.assert_allclose(ours[name], states[:, i], rtol=1e-9, atol=1e-9)
         assert ours[name + "_variance"][-1] == pytest.approx(covariance[i, i], rel=1e-9)
+    v_x, v_y, _ = states[-1]
+    slope = np.array([-v_y, v_x]) / (v_x * v_x + v_y * v_y)  # of the sideslip angle
+    variance = slope @ covariance[:2, :2] @ slope
+    assert ours["sideslip_variance"][-1] == pytest.approx(variance, rel=1e-9)
+    assert abs(slope[0] * slope[1] * covariance[0, 1]) > 1e-7 * variance
 
 
 def test_held_readings_count_once(run):

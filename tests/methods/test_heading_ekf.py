@@ -12,6 +12,7 @@ from gripbench.methods.heading_ekf import (
     HeadingEkf,
     field_in_vehicle,
     heading_predict,
+    heading_step,
     heading_update_field,
     wrapped,
 )
@@ -92,6 +93,30 @@ def test_predict_and_update_agree_with_filterpy():
         assert heading_update_field(heading[0], *field, params[0])
         np.testing.assert_allclose(heading["filter"]["x"][0], twin.x, rtol=0, atol=1e-9)
         np.testing.assert_allclose(heading["filter"]["P"][0], twin.P, rtol=0, atol=1e-9)
+
+
+def test_the_first_covariance_is_that_of_the_first_errors():
+    """An unknown roll tilts the steep field: it errs in yaw and roll together."""
+    method = HeadingEkf(alignment_time=0.0)
+    set_ = method.settings
+    rng = np.random.default_rng(2)
+    sample = drive(duration=0.1)[0][:1].copy()
+    errors = []
+    for _ in range(2000):
+        roll = set_["roll_std"] * rng.normal()
+        pitch = set_["alignment_pitch_std"] * rng.normal()
+        field = np.array(field_in_vehicle(0.7, roll, pitch, *FIELD, False))
+        field += set_["magnetometer_std"] * rng.normal(size=3)
+        for axis, value in zip("xyz", field, strict=True):
+            sample[f"magnetic_field_{axis}"] = value
+        heading, params = _records(method)
+        heading_step(heading[0], sample[0], params[0])
+        errors.append(heading["filter"]["x"][0] - [0.7 + set_["declination"], roll])
+    spread = np.cov(np.transpose(errors))
+    stated = heading["filter"]["P"][0]
+    np.testing.assert_allclose(np.diag(stated), np.diag(spread), rtol=0.15)
+    assert stated[0, 1] == pytest.approx(spread[0, 1], rel=0.15)
+    assert abs(spread[0, 1]) > 0.2 * np.sqrt(spread[0, 0] * spread[1, 1])
 
 
 def test_follows_a_weaving_drive():
