@@ -21,8 +21,8 @@ from typing import Self
 
 from pydantic import model_validator
 
-from gripbench.configuration import CONFIGS, Configuration, parse, read_toml
-from gripbench.errors import InputError, nearest, unknown
+from gripbench.configuration import CONFIGS, Configuration, named_file, parse, read_toml
+from gripbench.errors import InputError, nearest
 
 GRAVITY = 9.81
 """Gravitational acceleration [m/s^2]."""
@@ -192,11 +192,5 @@ def load_vehicle(name: str) -> Vehicle:
     InputError
         If there is no such vehicle or its file has a mistake.
     """
-    if name.endswith(".toml"):
-        path = Path(name)
-    else:
-        files = vehicle_files()
-        if name not in files:
-            raise unknown("vehicle", name, files)
-        path = files[name]
+    path = named_file("vehicle", name, vehicle_files())
     return parse(Vehicle, read_toml(path), path)

@@ -18,9 +18,9 @@ import numpy.typing as npt
 from pydantic import Field, model_validator
 
 from gripbench.compilation import compiled
-from gripbench.configuration import CONFIGS, Configuration, parse, read_toml
+from gripbench.configuration import CONFIGS, Configuration, named_file, parse, read_toml
 from gripbench.envs.signals import NEW, record_type, signal
-from gripbench.errors import InputError, unknown
+from gripbench.errors import InputError
 
 _CHUNK = 1024  # random numbers are drawn ahead in blocks; the stream is the same for any size
 
@@ -97,11 +97,10 @@ class _SuiteFile(Configuration):
 
 
 def load_sensor_suite(name: str) -> dict[str, Sensor]:
-    """Return the sensors of a suite that ships with gripbench, by channel."""
+    """Return the sensors of a suite that ships, or of the path of a TOML file, by channel."""
     files = {path.stem: path for path in (CONFIGS / "sensors").glob("*.toml")}
-    if name not in files:
-        raise unknown("sensor suite", name, files)
-    return parse(_SuiteFile, read_toml(files[name]), files[name]).sensors
+    path = named_file("sensor suite", name, files)
+    return parse(_SuiteFile, read_toml(path), path).sensors
 
 
 _SPEC = np.dtype(

@@ -8,10 +8,10 @@ from typing import Self
 
 from pydantic import model_validator
 
-from gripbench.configuration import CONFIGS, Configuration, parse, read_toml
+from gripbench.configuration import CONFIGS, Configuration, named_file, parse, read_toml
 from gripbench.envs.instruments.sensors import Sensor
 from gripbench.envs.signals import signal
-from gripbench.errors import GripbenchError, unknown
+from gripbench.errors import GripbenchError
 
 IDEAL = "ideal"
 """Grade of the instruments that the scenario itself names, those of the papers."""
@@ -61,10 +61,7 @@ def load_grade(name: str) -> Grade | None:
     """
     if name == IDEAL:
         return None
-    files = grade_files()
-    if not name.endswith(".toml") and name not in files:
-        raise unknown("instrument grade", name, [*files, IDEAL])
-    path = Path(name) if name.endswith(".toml") else files[name]
+    path = named_file("instrument grade", name, {**grade_files(), IDEAL: Path()})
     return _load(path, path.stat().st_mtime_ns if path.is_file() else 0)
 
 

@@ -17,13 +17,13 @@ from typing import Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from gripbench.configuration import CONFIGS, Configuration, parse, read_toml
+from gripbench.configuration import CONFIGS, Configuration, named_file, parse, read_toml
 from gripbench.envs.populations.causes import CAUSES, DIMENSION, PROCESSES, SHAPES_OF_TYRES
 from gripbench.envs.populations.grades import load_grade
 from gripbench.envs.populations.spreads import Spread, TyreChoice
 from gripbench.envs.scenarios import LEVELS
 from gripbench.envs.vehicles import Value
-from gripbench.errors import InputError, nearest, unknown
+from gripbench.errors import InputError, nearest
 
 TABLES = ("car", "tyre", "road", "drive")
 
@@ -209,12 +209,7 @@ def population_path(name: str) -> Path:
     InputError
         If none that ships has this name.
     """
-    if name.endswith(".toml"):
-        return Path(name)
-    files = population_files()
-    if name not in files:
-        raise unknown("population", name, files)
-    return files[name]
+    return named_file("population", name, population_files())
 
 
 @lru_cache(maxsize=16)
