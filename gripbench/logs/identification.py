@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,10 +20,9 @@ import numpy.typing as npt
 from scipy.optimize import least_squares
 
 from gripbench.envs.recordings import Recording
-from gripbench.envs.vehicles import GRAVITY, Value, Vehicle
+from gripbench.envs.vehicles import GRAVITY
 from gripbench.errors import InputError
 from gripbench.logs.derivation import slope
-from gripbench.writing import write_atomically
 
 CORRELATION = 0.2
 """Time [s] over which residuals are taken for correlated."""
@@ -32,6 +30,7 @@ CORRELATION = 0.2
 LOOSE = 0.2
 """Relative standard deviation above which a parameter counts as undetermined."""
 
+_MOST_GRIP = 1.5
 _MAY_BE_ZERO = ("steer_offset", "understeer_gradient")
 _SLOWEST = 0.8  # m/s; below, slip angles are noise
 _SMOOTHING = 0.1  # s, of the steering and yaw acceleration
@@ -80,6 +79,8 @@ class Identified:
             if name not in _MAY_BE_ZERO and self.deviations[name] > LOOSE * abs(value)
         ]
         mu = self.values.get("mu")
+        if mu is not None and mu > 0.99 * _MOST_GRIP:
+            loose.append(f"mu ({mu:.3g} is the end of what was searched: the tyres stay linear)")
         if mu is not None and self.reached is not None and mu < self.reached:
             loose.append(
                 f"mu ({mu:.3g} is below the |a_y|/g of {self.reached:.3g} that the training "
@@ -96,8 +97,9 @@ def identify_tyres(
     Parameters
     ----------
     recordings
-        Runs whose truth has `speed_x`, `speed_y`, `yaw_rate` and `accel_y`, and whose
-        observations have `steer_angle`; the window `train` is fitted, `test` only judged.
+        Runs with `speed_x`, `yaw_rate` and `accel_y` in their truth or, without a reference of
+        them, in their observations, with `speed_y` or `sideslip` in their truth and `steer_angle`
+        in their observations; the window `train` is fitted, `test` only judged.
     steering
         Whether scale and offset of the steering are fitted too.
     friction
@@ -110,6 +112,7 @@ def identify_tyres(
         If a signal or the geometry is missing, or the training windows hold too little.
     """
     needed = ("speed_x", "speed_y", "yaw_rate", "accel_y")
+    _require(recordings, (*needed, "steer_angle"))
     train = _axles(recordings, "train", needed)
     if train is None or train.forward.size < 100:
         raise InputError("identification: the windows 'train' hold fewer than 100 samples")
@@ -122,7 +125,7 @@ def identify_tyres(
     varied = steering and float(np.std(train.steer)) > np.deg2rad(1.0)
     free = np.array([True, True, friction is None, True, varied, varied])
     low = np.array([1.0, 1.0, 0.05, 0.05 * first[3], 0.5, -0.2])
-    high = np.array([500.0, 500.0, 1.5, 5.0 * first[3], 2.0, 0.2])
+    high = np.array([500.0, 500.0, _MOST_GRIP, 5.0 * first[3], 2.0, 0.2])
 
     def whole(part: Floats) -> Floats:
         full = first.copy()
@@ -173,6 +176,7 @@ def identify_steering(recordings: Sequence[Recording], known_scale: float = 1.0)
     InputError
         If a channel or the wheelbase is missing, or the training windows hold too little.
     """
+    _require(recordings, ("steer_angle", "yaw_rate", "speed_x"))
     parts = {name: _steady(recordings, name) for name in ("train", "test")}
     train, test = parts["train"], parts["test"]
     if train is None or len(train[0]) < 50:
@@ -201,47 +205,9 @@ def identify_steering(recordings: Sequence[Recording], known_scale: float = 1.0)
     )
 
 
-def identified_vehicle(vehicle: Vehicle, found: Identified, source: str) -> Vehicle:
-    """Return a vehicle with the tyres and the yaw inertia that were identified.
-
-    Parameters
-    ----------
-    vehicle
-        The vehicle as known before; its mass turns ratios into forces.
-    found
-        What `identify_tyres` returned.
-    source
-        The log, for the source of every value.
-    """
-    mass = vehicle.parameters["mass"].value
-    values = {
-        "cornering_stiffness_front": ("stiffness_front", mass),
-        "cornering_stiffness_rear": ("stiffness_rear", mass),
-        "yaw_inertia": ("gyration_squared", mass),
-    }
-    parameters = dict(vehicle.parameters)
-    for name, (key, factor) in values.items():
-        if key in found.values:
-            value, spread = factor * found.values[key], factor * found.deviations[key]
-            text = f"identified from {source}, standard deviation {spread:.2g}"
-            parameters[name] = Value(value=float(f"{value:.4g}"), source=text)
-    return vehicle.model_copy(update={"parameters": parameters})
-
-
-def write_vehicle(vehicle: Vehicle, path: Path) -> None:
-    """Write a vehicle's TOML file."""
-
-    def text(value: str) -> str:
-        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
-
-    lines = [f"name = {text(vehicle.name)}", f"description = {text(vehicle.description)}", ""]
-    lines.append("[parameters]")
-    for name, given in vehicle.parameters.items():
-        guess = ", guess = true" if given.guess else ""
-        lines.append(
-            f"{name} = {{ value = {given.value!r}, source = {text(given.source)}{guess} }}"
-        )
-    write_atomically(path, "\n".join(lines) + "\n")
+def with_velocity(recordings: Sequence[Recording]) -> bool:
+    """Return whether a reference tells the lateral velocity, so that tyres can be identified."""
+    return bool({"speed_y", "sideslip"} & set(recordings[0].truth.dtype.names or ()))
 
 
 @dataclass(frozen=True)
@@ -263,21 +229,21 @@ def _axles(recordings: Sequence[Recording], window: str, needed: tuple[str, ...]
     columns: list[Floats] = []
     spacing = []
     for recording in recordings:
-        _require(recording, needed, ("steer_angle",))
         truth, seen = recording.truth, recording.observations
-        inside = _inside(recording, window)
-        for name in needed:
-            inside &= np.isfinite(truth[name])
-        inside &= np.nan_to_num(truth["speed_x"]) > _SLOWEST
-        if inside.sum() < 3:
+        known = {name: signal_of(recording, name) for name in needed}
+        kept = inside(recording, window)
+        for values in known.values():
+            kept &= np.isfinite(values)
+        kept &= np.nan_to_num(known["speed_x"]) > _SLOWEST
+        if kept.sum() < 3:
             continue
         time = np.ascontiguousarray(truth["time"])
-        turn = np.nan_to_num(np.ascontiguousarray(truth["yaw_rate"]))
+        turn = np.nan_to_num(np.ascontiguousarray(known["yaw_rate"]))
         turning = slope(time, turn, _SMOOTHING)
         columns.append(
             np.array(
-                [*(truth[name][inside] for name in needed), turning[inside],
-                 seen["steer_angle"][inside]]
+                [*(known[name][kept] for name in needed), turning[kept],
+                 seen["steer_angle"][kept]]
             )
         )  # fmt: skip
         spacing.append(float(np.median(np.diff(time))))
@@ -322,22 +288,21 @@ def _brush(slip_angle: Floats, stiffness: float, largest: float) -> Floats:
 def _steady(recordings: Sequence[Recording], window: str) -> tuple[Floats, Floats, float] | None:
     steers, rows, spacing = [], [], []
     for recording in recordings:
-        _require(recording, (), ("steer_angle", "yaw_rate", "speed_gps"))
         seen = recording.observations
         time = np.ascontiguousarray(seen["time"])
         wide = max(3, round(0.5 / float(np.median(np.diff(time)))))
         kernel = np.ones(wide) / wide
         smooth = {
-            name: np.convolve(seen[name], kernel, mode="same")
-            for name in ("steer_angle", "yaw_rate", "speed_gps")
+            name: np.convolve(np.nan_to_num(signal_of(recording, name)), kernel, mode="same")
+            for name in ("steer_angle", "yaw_rate", "speed_x")
         }
-        inside = _inside(recording, window) & (smooth["speed_gps"] > 3.0)
-        inside[:wide] = inside[-wide:] = False  # the mean is cut short at the ends
-        speed, turn = smooth["speed_gps"][inside], smooth["yaw_rate"][inside]
+        kept = inside(recording, window) & (smooth["speed_x"] > 3.0)
+        kept[:wide] = kept[-wide:] = False  # the mean is cut short at the ends
+        speed, turn = smooth["speed_x"][kept], smooth["yaw_rate"][kept]
         wheelbase = recording.vehicle["cg_to_front"] + recording.vehicle["cg_to_rear"]
         ones = np.ones_like(speed)
         rows.append(np.array([ones, wheelbase * turn / speed, speed * turn / GRAVITY]).T)
-        steers.append(smooth["steer_angle"][inside])
+        steers.append(smooth["steer_angle"][kept])
         spacing.append(float(np.median(np.diff(time))))
     steer = np.concatenate(steers)
     if not steer.size:
@@ -346,27 +311,53 @@ def _steady(recordings: Sequence[Recording], window: str) -> tuple[Floats, Float
     return steer, np.concatenate(rows), max(1.0, 0.5 / float(np.median(spacing)))
 
 
-def _inside(recording: Recording, window: str) -> npt.NDArray[Any]:
+def inside(recording: Recording, window: str) -> npt.NDArray[Any]:
+    """Return which rows lie in a window, shape (n,)."""
     time = recording.truth["time"]
-    inside = np.zeros(len(time), dtype=bool)
+    within = np.zeros(len(time), dtype=bool)
     for start, end in recording.windows.get(window, ()):
-        inside |= (time >= start) & (time <= end)
-    return inside
+        within |= (time >= start) & (time <= end)
+    return within
 
 
-def _require(recording: Recording, truth: tuple[str, ...], seen: tuple[str, ...]) -> None:
-    for names, records, who in (
-        (truth, recording.truth, "reference"),
-        (seen, recording.observations, "recording"),
-    ):
-        for name in names:
-            if name not in (records.dtype.names or ()):
-                raise InputError(
-                    f"{recording.scenario}: the {who} has no '{name}' to identify from"
-                )
-    for name in ("cg_to_front", "cg_to_rear"):
-        if name not in recording.vehicle:
-            raise InputError(f"{recording.scenario}: the vehicle gives no '{name}'")
+_INSTEAD = {"speed_x": ("speed_x", "speed_gps"), "steer_angle": ("steer_angle",)}
+"""Channels that stand for a signal without a reference, the best first."""
+
+
+def signal_of(recording: Recording, name: str) -> Floats:
+    """Return a signal, shape (n,): the reference's, else a sensor's, else from the sideslip.
+
+    Without any, it is empty.
+    """
+    truth, seen = recording.truth.dtype.names or (), recording.observations.dtype.names or ()
+    if name in truth and name != "steer_angle":
+        return np.ascontiguousarray(recording.truth[name])
+    if name == "speed_y":
+        if "sideslip" not in truth or not len(signal_of(recording, "speed_x")):
+            return np.empty(0)
+        return signal_of(recording, "speed_x") * np.tan(recording.truth["sideslip"])
+    for channel in _INSTEAD.get(name, (name,)):
+        if channel in seen:
+            return np.ascontiguousarray(recording.observations[channel])
+    return np.empty(0)
+
+
+def _require(recordings: Sequence[Recording], names: tuple[str, ...]) -> None:
+    """Name all that is missing at once."""
+    first = recordings[0]
+    where = {"speed_x": "speed_x or speed_gps", "speed_y": "speed_y or sideslip in the reference"}
+    lacking = [
+        f"'{where.get(name, name)}'"
+        for name in names
+        if any(not len(signal_of(recording, name)) for recording in recordings)
+    ]
+    paper = [name for name in ("cg_to_front", "cg_to_rear") if name not in first.vehicle]
+    said = [f"the recording has no {', '.join(lacking)}"] if lacking else []
+    said += [f"the vehicle gives no {' and no '.join(paper)}"] if paper else []
+    if not any(recording.windows.get("train") for recording in recordings):
+        said.append("the map has no window 'train'")
+    if said:
+        raise InputError(f"{first.scenario}: nothing to identify from: {'; '.join(said)}")
 
 
 def _deviations(jacobian: Floats, residuals: Floats, correlated: float) -> Floats:

@@ -70,6 +70,20 @@ def placed_bound(channel_map: ChannelMap, signal: str, bound: Bound, origin: flo
     return Bounds(signal, bound.low, bound.high, start, end)
 
 
+def windows_text(recordings: Sequence[Recording]) -> str:
+    """Return the windows of a log on its own clock as one line."""
+    parts = []
+    for name in dict.fromkeys(name for one in recordings for name in one.windows):
+        spans = [
+            f"{start + origin:.3f} to {end + origin:.3f} s"
+            for one in recordings
+            for origin in [one.notes.get("time_origin", 0.0)]
+            for start, end in one.windows.get(name, ())
+        ]
+        parts.append(f"{name} {', '.join(spans)}")
+    return f"windows on the log's clock: {'; '.join(parts) or 'none, the whole log is scored'}"
+
+
 def check_windows(channel_map: ChannelMap, recordings: Sequence[Recording]) -> None:
     """Refuse a window that no run holds, or in which too little of the reference is known.
 

@@ -17,7 +17,7 @@ import pkgutil
 import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -237,7 +237,7 @@ def choose_method(
     Parameters
     ----------
     method
-        A choice as `split_choice` takes it, a class, or an instance.
+        A choice as `split_choice` takes it, the file of a `NamedVariant`, a class, or an instance.
     variant, parameters
         Settings, beside those in a text.
 
@@ -247,6 +247,8 @@ def choose_method(
         If it is unknown, cannot be loaded or takes no such settings.
     """
     settings = dict(parameters or {})
+    if isinstance(method, str) and method.endswith(".toml"):
+        return _named_variant(Path(method), settings)
     if isinstance(method, str):
         name, chosen, given = split_choice(method)
         variant = variant or chosen
@@ -278,6 +280,36 @@ def choose_method(
         isolated=isolated,
         digest=method_digest(source, declaration),
     )
+
+
+class NamedVariant(Configuration):
+    """A method's settings under a name of their own, with the record of where they come from.
+
+    Attributes
+    ----------
+    method
+        Choice `name[:variant]` whose settings these are.
+    name
+        Name of the variant.
+    settings
+        Values of parameters.
+    record
+        How they were found, as `gripbench tune --out` writes it.
+    """
+
+    method: str
+    name: str = Field(pattern=r"^[a-z][a-z0-9_]*$")
+    settings: dict[str, float | str | bool] = Field(default_factory=dict)
+    record: dict[str, Any] = Field(default_factory=dict)
+
+
+def _named_variant(path: Path, settings: Mapping[str, Any]) -> MethodSpec:
+    given = parse(NamedVariant, read_toml(path), path)
+    try:
+        spec = choose_method(given.method, parameters=given.settings | dict(settings))
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    return replace(spec, shown=f"{given.method}@{given.name}")
 
 
 def is_isolated(source: Source) -> bool:

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from gripbench.bench.running.recorded import RecordedScore
 
 
+RECORDING = "Name of a recording, folder of an imported one, or a map (TOML) beside its log."
+
+
 def register(app: typer.Typer) -> None:
     """Add the commands to the application."""
     app.command("import", rich_help_panel=LOGS)(import_)
@@ -132,27 +135,41 @@ def recordings(
 
 
 def tune(
-    recording: Annotated[str, typer.Argument(help="Published recording.")],
+    recording: Annotated[str, typer.Argument(help=RECORDING)],
     method: Annotated[str, typer.Argument(help="name[:variant] of a built-in method.")],
     target: Annotated[str, typer.Option(help="Signal whose error counts.")] = "sideslip",
     draws: Annotated[int, typer.Option(min=1, help="Settings to try.")] = 60,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Write the variant to this TOML file; run --method FILE.toml runs it."),
+    ] = None,
     data: Annotated[
         Path | None, typer.Option(help="Folder of the files instead of the one that is set.")
     ] = None,
 ) -> None:
-    """Tune a method's noise levels on the training windows of a recording."""
-    from gripbench.bench.running.tuning import settings_text, tune_published
+    """Tune a method on the training windows of a recording, over its parameters' ranges."""
+    from gripbench.bench.running.tuning import settings_text, tune_recording, write_variant
+    from gripbench.envs.signals import signal
+    from gripbench.writing import check_writable
 
-    tuned = tune_published(recording, method, target, draws, data)
+    if out is not None:
+        check_writable(out)
+    tuned = tune_recording(recording, method, target, draws, data)
+    spans = ", ".join(f"{start:.3f} to {end:.3f} s" for start, end in tuned.windows)
     print(
-        f"# {tuned.draws} draws, {target} on the training windows: "
-        f"{tuned.before:.3g} before, {tuned.after:.3g} after"
+        f"# {tuned.draws} trials, {target} on the training windows {spans}: RMS "
+        f"{tuned.before:.3g} {signal(target).unit} before, {tuned.after:.3g} after"
     )
+    if tuned.undetermined:
+        print(f"# at an end of its range, so not settled: {', '.join(tuned.undetermined)}")
     print(settings_text(tuned))
+    if out is not None:
+        write_variant(tuned, out)
+        print(f"# written to {out}")
 
 
 def identify(
-    recording: Annotated[str, typer.Argument(help="Published recording.")],
+    recording: Annotated[str, typer.Argument(help=RECORDING)],
     steering: Annotated[
         bool, typer.Option(help="Fit the steering's scale and offset with the tyres.")
     ] = True,
@@ -168,35 +185,46 @@ def identify(
     ] = None,
 ) -> None:
     """Identify tyres, or without a velocity reference the steering, and sensor biases."""
+    from gripbench.bench.running.recorded_logs import imported_of
     from gripbench.envs.signals import signal
-    from gripbench.envs.vehicles import load_vehicle
     from gripbench.errors import InputError
     from gripbench.logs.biases import identify_biases
-    from gripbench.logs.channel_map import load_channel_map
     from gripbench.logs.identification import (
-        identified_vehicle,
         identify_steering,
         identify_tyres,
+        with_velocity,
+    )
+    from gripbench.logs.identified_vehicles import (
+        identified_vehicle,
+        vehicle_of,
         write_vehicle,
     )
-    from gripbench.logs.published import load_recording, recording_files
+    from gripbench.logs.windows import windows_text
 
-    imported = load_recording(recording, data)
+    imported = imported_of(recording, data)
     runs = imported.recordings
-    with_tyres = "speed_y" in (runs[0].truth.dtype.names or ())
+    with_tyres = with_velocity(runs)
+    if out is not None and not with_tyres:
+        raise InputError(f"{recording}: without a velocity reference no tyres are identified")
     if with_tyres:
         found = identify_tyres(runs, steering, friction)
     else:
-        column = load_channel_map(recording_files()[recording]).channels["steer_angle"]
-        divisor = runs[0].vehicle[column.per] if column.per else 1.0
-        found = identify_steering(runs, column.scale / divisor)
+        column = imported.provenance.channel_map.get("channels", {}).get("steer_angle", {})
+        divisor = runs[0].vehicle[column["per"]] if column.get("per") else 1.0
+        found = identify_steering(runs, column.get("scale", 1.0) / divisor)
+    print(windows_text(runs))
     for name, value in found.values.items():
         print(f"{name:20} {value:10.4g}  standard deviation {found.deviations[name]:.2g}")
     unseen = "" if found.test_rms is None else f", on the test windows {found.test_rms:.3g}"
     print(f"unexplained RMS on the training windows {found.train_rms:.3g}{unseen} {found.unit}")
     if (spread := found.undetermined()) is not None:
         print(spread)
-    for bias in identify_biases(runs):
+    try:
+        biases = identify_biases(runs)
+    except InputError as error:
+        print(f"biases undetermined: {error}")
+        biases = []
+    for bias in biases:
         name = f"{bias.channel} bias"
         unseen = "" if bias.test_rms is None else f"; on test blocks {bias.test_rms:.2g}"
         print(
@@ -204,10 +232,8 @@ def identify(
             f"{signal(bias.channel).unit}, from {bias.blocks} blocks in {bias.found_from}{unseen}"
         )
     if out is not None:
-        if not with_tyres:
-            raise InputError(f"{recording}: without a velocity reference no tyres are identified")
-        vehicle = load_vehicle(str(imported.provenance.channel_map["vehicle"]))
-        write_vehicle(identified_vehicle(vehicle, found, recording), out)
+        vehicle = vehicle_of(imported.provenance.channel_map, runs[0])
+        write_vehicle(identified_vehicle(vehicle, found, runs[0].scenario), out)
         print(f"written to {out}")
 
 

@@ -11,6 +11,7 @@ import os
 import platform
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,12 @@ from gripbench.bench.running.dependencies import folder_of, kept, unchanged
 from gripbench.bench.running.execution import Outcome, SkippedError, execute, missing
 from gripbench.bench.running.fingerprints import versions, world_digest
 from gripbench.bench.running.processes import stop_starters
-from gripbench.bench.running.recorded_scenarios import RecordedScenario, judged, recording_of
+from gripbench.bench.running.recorded_scenarios import (
+    RecordedScenario,
+    judged,
+    log_run_of,
+    recording_of,
+)
 from gripbench.bench.running.rows import Row, Status
 from gripbench.bench.running.sandbox import CellFailure, Limits, Sandbox
 from gripbench.bench.running.store import row_path
@@ -61,8 +67,10 @@ class Cell:
         return row_path(self.scenario.name, self.method.label, self.seed)
 
     @property
-    def recording(self) -> tuple[str, int]:
-        """What names its recording: cells with the same one need a single simulation."""
+    def recording(self) -> tuple[str, int | str]:
+        """What cells of one task share: a simulation, or a method's pass over a log."""
+        if isinstance(self.scenario, RecordedScenario):
+            return self.scenario.name, self.method.label
         return self.scenario.name, self.seed
 
 
@@ -83,7 +91,8 @@ class Task:
     Attributes
     ----------
     cells
-        At least one; all have the same scenario and seed.
+        At least one; all have the same scenario and seed, or are windows of one log with the same
+        method.
     limits
         What a simulation, and a cell of an isolated method, may take.
     timed
@@ -113,6 +122,8 @@ def run_task(task: Task) -> list[Row]:
     scenario, seed = task.cells[0].scenario, task.cells[0].seed
     if isinstance(scenario, RecordedScenario) and scenario.absent:
         return [_row(cell, (), "skipped", scenario.absent) for cell in task.cells]
+    if isinstance(scenario, RecordedScenario):
+        return _run_windows(task, scenario)
     try:
         with deadline(task.limits.time):
             recording = recording_of(scenario, seed)
@@ -131,6 +142,34 @@ def run_task(task: Task) -> list[Row]:
             _row(cell, cell.method.declaration.estimates, "failed", reason) for cell in task.cells
         ]
     return [run_cell(cell, recording, task.limits, task.timed) for cell in task.cells]
+
+
+def _run_windows(task: Task, scenario: RecordedScenario) -> list[Row]:
+    """Run a method once over each run of a log, and score that pass in every window."""
+    rows = []
+    by_run = groupby(task.cells, key=lambda cell: log_run_of(scenario, cell.seed))
+    for cells in [tuple(group) for _, group in by_run]:
+        final = max(cells, key=lambda cell: cell.seed)
+        passed = _passed(final, task.limits, task.timed) if len(cells) > 1 else None
+        for cell in cells:
+            recording = recording_of(scenario, cell.seed)
+            rows.append(run_cell(cell, recording, task.limits, task.timed, passed))
+    return rows
+
+
+def _passed(cell: Cell, limits: Limits, timed: bool) -> Outcome | None:
+    """Return a method's pass over a log to the end of a window; None where it does not get there.
+
+    Each window is then run by itself, so that what happens after its end does not count in it.
+    """
+    recording = recording_of(cell.scenario, cell.seed)
+    channels = recording.observations.dtype.names or ()
+    if missing(cell.method.declaration, recording.vehicle, channels):
+        return None
+    try:
+        return _outcome(cell, recording, limits, timed)
+    except Exception:
+        return None
 
 
 _checked: set[tuple[str, str]] = set()
@@ -154,8 +193,18 @@ def _check_code(cell: Cell) -> None:
     _checked.add(shared)
 
 
-def run_cell(cell: Cell, recording: Recording, limits: Limits, timed: bool) -> Row:
-    """Run one method over a recording and score it; whatever happens, there is a row."""
+def run_cell(
+    cell: Cell,
+    recording: Recording,
+    limits: Limits,
+    timed: bool,
+    passed: Outcome | None = None,
+) -> Row:
+    """Run one method over a recording and score it; whatever happens, there is a row.
+
+    `passed` is a pass of the method that goes on after the recording's end: nothing later reaches
+    the samples before, so its first part is what the method makes of the recording.
+    """
     declaration = cell.method.declaration
     channels = recording.observations.dtype.names or ()
     targets = targets_of(declaration.estimates, recording)
@@ -166,7 +215,10 @@ def run_cell(cell: Cell, recording: Recording, limits: Limits, timed: bool) -> R
         return _row(cell, targets, "skipped", reason)
     read: Mapping[str, Any] = {}
     try:
-        outcome = _outcome(cell, recording, limits, timed)
+        if passed is None:
+            outcome = _outcome(cell, recording, limits, timed)
+        else:
+            outcome = replace(passed, estimates=passed.estimates[: len(recording.truth)])
         read = outcome.read
         if isinstance(cell.scenario, RecordedScenario):
             recording = judged(recording, outcome.estimates)

@@ -1,7 +1,8 @@
 """Recordings of real vehicles as scenarios of a run: every window of the test time is one run.
 
 `recording:NAME` is a published recording or one that `gripbench import` has stored below
-`recordings`; `recording:FOLDER` is one stored elsewhere. A method runs from the start of the log to
+`recordings`; `recording:FOLDER` is one stored elsewhere, `recording:MAP.toml` a log beside its map.
+A method runs from the start of the log to
 the end of the window, as in a vehicle, and is scored inside the window only. What the map sets for
 a method holds unless the user sets it otherwise.
 
@@ -13,16 +14,16 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import asdict, dataclass, replace
-from functools import lru_cache
 from itertools import pairwise
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
 import numpy.typing as npt
 from pydantic import Field, model_validator
 
 from gripbench.bench.catalogue.declarations import declaration_of
+from gripbench.bench.running.recorded_logs import PREFIX as PREFIX
+from gripbench.bench.running.recorded_logs import load_place, place_of
 from gripbench.envs.instruments.sensors import Sensor
 from gripbench.envs.recordings import Recording
 from gripbench.envs.scenarios import Scenario
@@ -34,17 +35,11 @@ if TYPE_CHECKING:
     from gripbench.bench.catalogue.registry import MethodSpec
     from gripbench.logs.importing import ImportedLog
 
-PREFIX = "recording:"
-"""What the names of these scenarios begin with."""
-
 SHORTEST = 3.0
 """Length [s] of a window, longer where there would be more than `MOST`."""
 
 MOST = 20
 """Windows that a recording has at most, about."""
-
-STORED = Path("recordings")
-"""Where `gripbench import` keeps recordings unless told otherwise."""
 
 _ANGLES = ("yaw", "sideslip", "course")
 _Interval = tuple[float, float]
@@ -90,11 +85,22 @@ class RecordedScenario(Scenario):
 
 @dataclass(frozen=True)
 class Window:
-    """One run of a recorded scenario: an interval [s] of one of the log's recordings."""
+    """One run of a recorded scenario: an interval [s] of one of the log's recordings.
+
+    Attributes
+    ----------
+    recording
+        Which of the log's recordings.
+    start, end
+        The interval on the clock of its rows, which starts at 0.
+    last
+        Whether its end belongs to it; where another window follows, the sample is that one's.
+    """
 
     recording: int
     start: float
     end: float
+    last: bool = True
 
 
 def recorded_scenario(place: str) -> RecordedScenario:
@@ -103,7 +109,8 @@ def recorded_scenario(place: str) -> RecordedScenario:
     Parameters
     ----------
     place
-        Name of a published recording, of one stored below `recordings`, or a folder.
+        Name of a published recording, of one stored below `recordings`, the folder of one stored
+        elsewhere, or a map (TOML) beside its log.
 
     Raises
     ------
@@ -112,9 +119,9 @@ def recorded_scenario(place: str) -> RecordedScenario:
     """
     from gripbench.logs.published import AbsentDataError
 
-    place = _place(place.removeprefix(PREFIX))
+    place = place_of(place.removeprefix(PREFIX))
     try:
-        imported = _load(place)
+        imported = load_place(place)
     except AbsentDataError as error:
         return RecordedScenario(
             name=PREFIX + place, description="", vehicle="", horizon=1.0, sample_time=1.0,
@@ -161,7 +168,7 @@ def recording_of(scenario: Scenario, seed: int) -> Recording:
         return record(scenario, seed)
     if scenario.absent:
         raise InputError(scenario.absent)
-    imported = _load(scenario.place)
+    imported = load_place(scenario.place)
     recordings = imported.recordings
     windows = windows_of(recordings)
     if seed >= len(windows):
@@ -169,6 +176,11 @@ def recording_of(scenario: Scenario, seed: int) -> Recording:
     chosen = windows[seed]
     given = imported.provenance.channel_map.get("derived", {}).get("instruments", ())
     return _part(recordings[chosen.recording], chosen, scenario.name, seed, tuple(given))
+
+
+def log_run_of(scenario: RecordedScenario, seed: int) -> int:
+    """Return which of a log's runs a window belongs to: one pass serves all windows of it."""
+    return windows_of(load_place(scenario.place).recordings)[seed].recording
 
 
 def on_recording(spec: MethodSpec, scenario: Scenario) -> MethodSpec:
@@ -252,6 +264,10 @@ def windows_of(recordings: tuple[Recording, ...]) -> tuple[Window, ...]:
         edges = np.linspace(start, end, max(1, round((end - start) / length)) + 1)
         for low, high in pairwise(edges):
             windows.append(Window(index, float(low), float(high)))
+    windows = [
+        replace(one, last=(one.recording, one.end) != (after.recording, after.start))
+        for one, after in pairwise([*windows, Window(-1, 0.0, 0.0)])
+    ]
     return tuple(windows)
 
 
@@ -276,7 +292,8 @@ def _part(
     from gripbench.logs.excitation import utilisation_bound
 
     time = recording.truth["time"]
-    kept = slice(0, int(np.searchsorted(time, window.end, side="right")))
+    side: Literal["left", "right"] = "right" if window.last else "left"
+    kept = slice(0, int(np.searchsorted(time, window.end, side=side)))
     inside = time[kept] >= window.start
     truth = recording.truth[kept]
     bounds = tuple(
@@ -312,46 +329,6 @@ def _part(
         windows={"test": ((window.start, window.end),)},
         bounds=bounds,
     )
-
-
-def _place(name: str) -> str:
-    from gripbench.errors import unknown
-    from gripbench.logs.published import recording_files
-
-    if name in recording_files():
-        return name
-    for folder in (Path(name), STORED / name):
-        if (folder / "recording.json").is_file():
-            return str(folder.resolve())
-    if Path(name).is_dir():
-        raise InputError(f"{name}: is no recording; gripbench import makes one of a log")
-    stored = {path.parent.name for path in STORED.glob("*/recording.json")}
-    raise unknown("recording", name, {*recording_files(), *stored})
-
-
-def _load(place: str) -> ImportedLog:
-    from gripbench.logs.locations import data_folder
-    from gripbench.logs.published import recording_files
-
-    if place in recording_files():
-        return _published(place, data_folder())
-    about = Path(place) / "recording.json"
-    return _stored(place, about.stat().st_mtime_ns if about.is_file() else 0)
-
-
-@lru_cache(maxsize=4)
-def _published(name: str, folder: Path) -> ImportedLog:
-    from gripbench.logs.published import load_recording
-
-    return load_recording(name, folder)
-
-
-@lru_cache(maxsize=4)
-def _stored(place: str, changed: int) -> ImportedLog:
-    from gripbench.logs.storing import load
-
-    del changed  # part of the cache's key only: the log may be imported again
-    return load(Path(place))
 
 
 def _digest(imported: ImportedLog) -> str:

@@ -65,9 +65,13 @@ class Plan:
         for scenario in self.scenarios:
             world = world_digest(scenario)
             methods = [on_recording(method, scenario) for method in self.methods]
-            for seed in self.seeds_of(scenario):
+            seeds = self.seeds_of(scenario)
+            if isinstance(scenario, RecordedScenario):
                 for method in methods:
-                    yield cell_of(scenario, seed, method, world)
+                    yield from (cell_of(scenario, seed, method, world) for seed in seeds)
+                continue
+            for seed in seeds:
+                yield from (cell_of(scenario, seed, method, world) for method in methods)
 
 
 class InterruptedRun(KeyboardInterrupt):
@@ -203,15 +207,16 @@ def _chunks(
 
     def task(cells: Iterable[Cell]) -> Task:
         chosen = tuple(cells)
-        name, seed = chosen[0].recording
-        return Task(chosen, limits, timed=seed == first[name])
+        timed = any(cell.seed == first[cell.scenario.name] for cell in chosen)
+        return Task(chosen, limits, timed)
 
-    alone = 2 * backend.processes
+    logs = any(isinstance(cell.scenario, RecordedScenario) for cell in waiting)
+    alone = 0 if logs else 2 * backend.processes  # one pass over a log serves all its windows
     yield from ((task([cell]),) for cell in waiting[:alone])
     recordings = groupby(waiting[alone:], key=lambda cell: cell.recording)
     tasks = (task(cells) for _, cells in recordings)
     isolated = any(method.isolated for method in plan.methods)
-    size = 1 if isolated or backend.processes == 1 else CHUNK
+    size = 1 if isolated or logs or backend.processes == 1 else CHUNK
     while chunk := tuple(islice(tasks, size)):
         yield chunk
 

@@ -1,54 +1,94 @@
-"""Tune a method's noise levels on the training windows of a recording, each method alike.
+"""A method and a recording in, its settings tuned on the training windows out, each method alike.
 
-The same number of draws for every method, log-uniform around its present settings; the test
-windows are not looked at. Nothing but noise levels is drawn: a setting that changes what a method
-is (a switch, a geometry) is its author's.
+Every method gets the same budget of trials: half of them spread over the ranges that its parameters
+declare (Sobol points), half of them a simplex search (Nelder & Mead) from the best of these. The
+test windows are not looked at. Switches, whole numbers, choices and parameters without a finite
+range stay as they are, and so does what is fixed.
 """
 
 from __future__ import annotations
 
 import zlib
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from gripbench.bench.catalogue.registry import built_in_methods, choose_method
-from gripbench.bench.running.recorded import score_recordings
+from gripbench.bench.catalogue.registry import MethodSpec, built_in_methods, choose_method
+from gripbench.bench.running.execution import SkippedError, execute, missing
+from gripbench.bench.running.recorded_logs import imported_of
+from gripbench.bench.running.recorded_scenarios import judged
+from gripbench.bench.scoring.scoring import DivergedError, check_estimates
 from gripbench.envs.recordings import Recording
+from gripbench.envs.signals import signal
 from gripbench.errors import InputError, unknown
-from gripbench.logs.published import load_recording
+from gripbench.logs.identification import inside
+from gripbench.methods.settings import Parameter
+from gripbench.writing import write_atomically
+
+BUDGET = 60
+"""Trials of each method beside its settings as they are."""
 
 NOISE_LEVELS = ("_noise", "_walk", "_std", "_density")
 """Endings of the parameters that are noise levels."""
 
-SPREAD = 30.0
-"""Largest factor by which a draw differs from the present setting."""
+_WIDE = 10.0  # ratio of a range's ends from which it is searched by its logarithm
+
+Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Tuned:
-    """The best settings found.
+    """The best settings found, and how.
 
     Attributes
     ----------
     method
         Choice that was tuned.
+    target
+        The signal whose error counted.
     settings
-        Parameters that differ from the method's own, the fixed ones included.
+        Parameters that were set, the fixed ones included.
     before, after
-        Figure on the training windows with the settings before and after.
+        RMS error on the training windows with the settings before and after, SI units.
     draws
         How many settings were tried.
+    recording
+        Name of the recording.
+    windows
+        Training windows [s] on the log's clock, by run.
+    undetermined
+        Parameters that ended at an end of their range: the log does not bound them.
     """
 
     method: str
+    target: str
     settings: dict[str, float]
     before: float
     after: float
     draws: int
+    recording: str = ""
+    windows: tuple[tuple[float, float], ...] = ()
+    undetermined: tuple[str, ...] = field(default=())
+
+
+def searched(method: str, fixed: Mapping[str, Any] = {}) -> list[Parameter]:
+    """Return the parameters of a built-in method that a search may change."""
+    name = method.partition(":")[0]
+    methods = built_in_methods()
+    if name not in methods:
+        raise unknown("method", name, methods)
+    return [
+        one
+        for one in methods[name].parameters
+        if isinstance(one.default, float)
+        and np.isfinite([one.low, one.high]).all()
+        and one.low < one.high
+        and one.name not in fixed
+    ]
 
 
 def tune(
@@ -56,7 +96,7 @@ def tune(
     recordings: Sequence[Recording],
     target: str,
     fixed: dict[str, float] | None = None,
-    draws: int = 60,
+    draws: int = BUDGET,
     seed: int = 0,
 ) -> Tuned:
     """Tune a built-in method for one target.
@@ -70,7 +110,7 @@ def tune(
     target
         The signal whose error counts.
     fixed
-        Settings that are known and not drawn.
+        Settings that are known and not searched.
     draws
         Settings to try beside the present ones.
     seed
@@ -79,61 +119,179 @@ def tune(
     Raises
     ------
     InputError
-        If there is no training window, or the method has no noise level or cannot run.
+        If there is no training window, or the method has nothing to tune or cannot run.
     """
-    training = [
-        replace(recording, windows={"test": recording.windows["train"]})
-        for recording in recordings
-        if "train" in recording.windows
-    ]
+    from scipy.optimize import minimize
+    from scipy.stats import qmc
+
+    name = recordings[0].scenario
+    training = [one for one in recordings if one.windows.get("train")]
     if not training:
-        raise InputError(f"{recordings[0].scenario}: has no window 'train' to tune on")
+        raise InputError(f"{name}: has no window 'train' to tune on")
     known = dict(fixed or {})
-    name = method.partition(":")[0]
-    methods = built_in_methods()
-    if name not in methods:
-        raise unknown("method", name, methods)
-    levels = {
-        parameter.name: parameter
-        for parameter in methods[name].parameters
-        if parameter.name.endswith(NOISE_LEVELS)
-        and isinstance(parameter.default, float)
-        and parameter.default > 0.0
-        and parameter.name not in known
-    }
-    if not levels:
-        raise InputError(f"{method}: has no noise level to tune")
+    parameters = searched(method, known)
+    spec = choose_method(method, parameters=known)
+    if not parameters:
+        raise InputError(f"{method}: has no parameter with a range to tune")
+    start = np.array([float(spec.declaration.settings[one.name]) for one in parameters])  # type: ignore[arg-type]
+    scale = _Scale(parameters, start)
+    before = training_error(spec, training, target)
+    best: tuple[float, Floats] = (before, scale.unit(start))
+
+    def error(point: Floats) -> float:
+        nonlocal best
+        chosen = scale.settings(np.clip(point, 0.0, 1.0))
+        try:
+            tried = choose_method(method, parameters=known | chosen)
+            found = training_error(tried, training, target)
+        except DivergedError:
+            found = np.inf
+        if found < best[0]:
+            best = found, np.clip(point, 0.0, 1.0)
+        return found if np.isfinite(found) else 1e6 * (1.0 + before)
+
+    spread = (draws + 1) // 2
     random = np.random.default_rng([seed, zlib.crc32(method.encode())])
-    best, before = dict(known), _figure(method, training, target, known)
-    after = before
-    for _ in range(draws):
-        drawn = {
-            key: float(
-                np.clip(level.default * SPREAD ** random.uniform(-1.0, 1.0), level.low, level.high)
+    points = qmc.Sobol(len(parameters), rng=random).random(1 << (spread - 1).bit_length())
+    for point in points[:spread]:
+        error(point)
+    if draws > spread:
+        minimize(
+            error, best[1], method="Nelder-Mead", bounds=[(0.0, 1.0)] * len(parameters),
+            options={"maxfev": draws - spread, "initial_simplex": _simplex(best[1])},
+        )  # fmt: skip
+    after, point = best
+    settings = known | (scale.settings(point) if after < before else {})
+    loose = tuple(
+        one.name
+        for one, place in zip(parameters, point, strict=True)
+        if after < before and (place < 0.01 or place > 0.99)
+    )
+    windows = tuple(
+        (start + one.notes.get("time_origin", 0.0), end + one.notes.get("time_origin", 0.0))
+        for one in training
+        for start, end in one.windows["train"]
+    )
+    return Tuned(method, target, settings, before, after, draws, name, windows, loose)
+
+
+def training_error(spec: MethodSpec, recordings: Sequence[Recording], target: str) -> float:
+    """Return a method's RMS error [SI] over all training windows.
+
+    Raises
+    ------
+    InputError
+        If it cannot run or nothing is known of the target there.
+    DivergedError
+        If an estimate is not finite.
+    """
+    declaration = spec.declaration
+    if target not in declaration.estimates:
+        raise InputError(
+            f"{spec.label}: does not estimate '{target}' but {', '.join(declaration.estimates)}"
+        )
+    total, count = 0.0, 0
+    for recording in recordings:
+        reason = missing(declaration, recording.vehicle, recording.observations.dtype.names or ())
+        if reason:
+            raise InputError(f"{spec.label}: {reason}")
+        last = max(end for _, end in recording.windows["train"])
+        kept = int(np.searchsorted(recording.truth["time"], last, side="right"))
+        part = cut(recording, kept)
+        try:
+            outcome = execute(spec.make(), declaration, part.vehicle, part.observations, 0.0, False)
+        except SkippedError as error:
+            raise InputError(f"{spec.label}: {error}") from None
+        check_estimates(outcome.estimates, declaration.outputs, kept)
+        estimate = outcome.estimates[target]
+        if not np.isfinite(estimate).all():
+            raise DivergedError(f"{target} is not finite")
+        truth = judged(part, outcome.estimates).truth
+        if target not in (truth.dtype.names or ()):
+            known = [name for name in declaration.estimates if name in (truth.dtype.names or ())]
+            raise InputError(
+                f"{spec.label}: nothing is known of '{target}' on the training windows; known is "
+                f"{', '.join(known) or 'nothing that it estimates'}"
             )
-            for key, level in levels.items()
-        }
-        figure = _figure(method, training, target, known | drawn)
-        if figure < after:
-            best, after = known | drawn, figure
-    return Tuned(method, best, before, after, draws)
+        counted = inside(part, "train") & np.isfinite(truth[target])
+        difference = estimate[counted] - truth[target][counted]
+        total += float(difference @ difference)
+        count += len(difference)
+    if not count:
+        raise InputError(f"{spec.label}: nothing is known of '{target}' on the training windows")
+    return float(np.sqrt(total / count))
 
 
-def tune_published(
-    name: str, method: str, target: str, draws: int = 60, folder: Path | None = None
+def cut(recording: Recording, rows: int) -> Recording:
+    """Return the first rows of a recording, with a place for each signal that has bounds."""
+    from dataclasses import replace
+
+    from gripbench.envs.signals import record_type
+
+    truth = recording.truth[:rows]
+    names = list(truth.dtype.names or ())
+    bounded = [one.signal for one in recording.bounds if one.signal not in names]
+    if bounded:
+        wider = np.empty(rows, record_type([*names, *dict.fromkeys(bounded)]))
+        for name in names:
+            wider[name] = truth[name]
+        for name in bounded:
+            wider[name] = np.nan
+        truth = wider
+    return replace(recording, observations=recording.observations[:rows], truth=truth)
+
+
+class _Scale:
+    """Parameters to points of the unit cube and back; wide ranges by their logarithm."""
+
+    def __init__(self, parameters: Sequence[Parameter], start: Floats) -> None:
+        self.names = [one.name for one in parameters]
+        self.low = np.array([one.low for one in parameters])
+        self.high = np.array([one.high for one in parameters])
+        lowest = np.where(self.low > 0.0, self.low, 1e-4 * np.abs(start))
+        self.wide = (self.low >= 0.0) & (lowest > 0.0) & (self.high > _WIDE * lowest)
+        self.low = np.where(self.wide, lowest, self.low)
+
+    def unit(self, values: Floats) -> Floats:
+        """Return values as a point of the unit cube."""
+        low, high, at = (self._scaled(each) for each in (self.low, self.high, values))
+        return np.clip((at - low) / (high - low), 0.0, 1.0)
+
+    def settings(self, point: Floats) -> dict[str, float]:
+        """Return the values at a point, rounded to five digits as a file shows them."""
+        low, high = self._scaled(self.low), self._scaled(self.high)
+        at = low + point * (high - low)
+        values = np.where(self.wide, np.exp(np.where(self.wide, at, 0.0)), at)
+        values = np.clip([float(f"{value:.5g}") for value in values], self.low, self.high)
+        return dict(zip(self.names, values.tolist(), strict=True))
+
+    def _scaled(self, values: Floats) -> Floats:
+        return np.where(
+            self.wide, np.log(np.where(self.wide, np.maximum(values, 1e-300), 1.0)), values
+        )
+
+
+def _simplex(start: Floats) -> Floats:
+    """Return a simplex around a point of the unit cube, inside of it."""
+    steps = np.where(start > 0.5, -0.1, 0.1)
+    return np.vstack([start, start + np.diag(steps)])
+
+
+def tune_recording(
+    place: str, method: str, target: str, draws: int = BUDGET, folder: Path | None = None
 ) -> Tuned:
-    """Tune a method on a published recording; settings of its map that are no noise level stay.
+    """Tune a method on a recording; settings of its map that are no noise level stay.
 
     Parameters
     ----------
-    name
-        Name of the recording.
+    place
+        Name, folder or map of the recording, see `recorded_scenarios.recorded_scenario`.
     method, target, draws
         See `tune`.
     folder
-        Where the files lie, see `gripbench.logs.locations`.
+        Where the files of published recordings lie, see `gripbench.logs.locations`.
     """
-    imported = load_recording(name, folder)
+    imported = imported_of(place, folder)
     settings = imported.provenance.channel_map.get("settings", {})
     known = settings.get(method.partition(":")[0], {})
     fixed = {key: value for key, value in known.items() if not key.endswith(NOISE_LEVELS)}
@@ -143,26 +301,33 @@ def tune_published(
 def settings_text(tuned: Tuned) -> str:
     """Return the settings as the lines of a channel map."""
     lines = [f"[settings.{tuned.method.partition(':')[0]}]"]
-    lines += [f"{key} = {value:.3g}" for key, value in tuned.settings.items()]
+    lines += [f"{key} = {value:.5g}" for key, value in tuned.settings.items()]
     return "\n".join(lines)
 
 
-def _figure(
-    method: str, recordings: Sequence[Recording], target: str, settings: dict[str, Any]
-) -> float:
-    spec = choose_method(method, parameters=settings)
-    scored: list[str] = []
-    for row in score_recordings(recordings, [spec]):
-        if row.kind == "method":
-            if row.status == "skipped":
-                raise InputError(f"{method}: {row.reason}")
-            if row.target == target and row.value is not None:
-                return row.value if row.outside is None else row.outside
-            if row.status == "ok":
-                scored.append(row.target)
-    if scored:
-        raise InputError(
-            f"{method}: nothing is known of '{target}' on the training windows; "
-            f"scored are {', '.join(scored)}"
-        )
-    return float("inf")
+def variant_name(tuned: Tuned) -> str:
+    """Return the name of the variant that a recording's tuning makes."""
+    return f"tuned_{tuned.recording}_{tuned.target}"
+
+
+def write_variant(tuned: Tuned, path: Path) -> None:
+    """Write the settings as a variant with its record: `--method FILE.toml` chooses it."""
+    unit = signal(tuned.target).unit
+    lines = [
+        f'method = "{tuned.method}"',
+        f'name = "{variant_name(tuned)}"',
+        "",
+        "[settings]",
+        *(f"{key} = {float(value)!r}" for key, value in tuned.settings.items()),
+        "",
+        "[record]",
+        f'recording = "{tuned.recording}"',
+        f'target = "{tuned.target}"',
+        f"windows = {[list(window) for window in tuned.windows]}",
+        f"trials = {tuned.draws}",
+        f'unit = "{unit}"',
+        f"before = {tuned.before:.6g}",
+        f"after = {tuned.after:.6g}",
+        f"at_an_end_of_its_range = {list(tuned.undetermined)}".replace("'", '"'),
+    ]
+    write_atomically(path, "\n".join(lines) + "\n")

@@ -1,0 +1,215 @@
+"""A log of a real vehicle in; its quality, identification, tuned methods and scored rows out.
+
+Vehicle and methods are fitted on the training windows only; the rows are of the test windows. Where
+the map names no window, the first half of each run is for training and the second for the test.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from gripbench.bench.catalogue.registry import MethodSpec, built_in_methods, choose_method
+from gripbench.bench.running.backends import Backend
+from gripbench.bench.running.execution import missing
+from gripbench.bench.running.recorded_logs import PREFIX
+from gripbench.bench.running.recorded_scenarios import recorded_scenario
+from gripbench.bench.running.rows import Row
+from gripbench.bench.running.runner import Plan, run_plan
+from gripbench.bench.running.store import Store
+from gripbench.bench.running.tuning import BUDGET, Tuned, searched, tune, write_variant
+from gripbench.envs.recordings import Recording
+from gripbench.envs.vehicles import CarOnPaper
+from gripbench.errors import InputError
+from gripbench.logs.identification import LOOSE, Identified, identify_tyres, with_velocity
+from gripbench.logs.importing import ImportedLog, import_log
+from gripbench.logs.storing import store
+
+_ON_PAPER = {
+    "stiffness_front": "cornering_stiffness_front",
+    "stiffness_rear": "cornering_stiffness_rear",
+    "gyration_squared": "yaw_inertia",
+}
+
+
+@dataclass(frozen=True)
+class Study:
+    """What a study found.
+
+    Attributes
+    ----------
+    imported
+        The log, with its quality report, its windows and the vehicle as methods got it.
+    found
+        Identified parameters; None where nothing could be identified.
+    tuned
+        Tuned methods.
+    rows
+        Scores of methods, tuned methods and baselines on the test windows.
+    left_out
+        Why other methods did not run, by choice.
+    undetermined
+        Sentences on what the log could not tell.
+    folder
+        Where recording, variants and rows lie.
+    target
+        The signal that was tuned and ranked for.
+    """
+
+    imported: ImportedLog
+    found: Identified | None
+    tuned: tuple[Tuned, ...]
+    rows: tuple[Row, ...]
+    left_out: dict[str, str]
+    undetermined: tuple[str, ...]
+    folder: Path
+    target: str
+
+
+def study(
+    log: Path,
+    channel_map: Path,
+    folder: Path,
+    target: str = "sideslip",
+    budget: int = BUDGET,
+    workers: int = 0,
+    say: Callable[[str], None] = lambda text: None,
+) -> Study:
+    """Study a log.
+
+    Parameters
+    ----------
+    log, channel_map
+        The log, or the folder of the map's files, and the map.
+    folder
+        Where the recording, the tuned variants and the rows go.
+    target
+        The signal to tune and rank for.
+    budget
+        Trials of each method.
+    workers
+        Processes of the run; 0: one a core.
+    say
+        Called with a sentence as each part begins.
+
+    Raises
+    ------
+    InputError
+        On the first mistake in map or log, and if the reference does not have the target.
+    """
+    words: list[str] = []
+    say("importing")
+    imported = import_log(log, channel_map)
+    first = imported.recordings[0]
+    known = {*(first.truth.dtype.names or ()), *(bound.signal for bound in first.bounds)} - {"time"}
+    if target not in known:
+        shown = sorted(name for name in known if not name.endswith("_new"))
+        raise InputError(
+            f"{channel_map}: the reference has no '{target}' to study; "
+            f"it has {', '.join(shown) or 'nothing'}"
+        )
+    if not any(any(one.windows.values()) for one in imported.recordings):
+        imported = replace(imported, recordings=tuple(_halved(r) for r in imported.recordings))
+        words.append(
+            "The map names no windows: the first half of the log was taken for training, the "
+            "second for the test."
+        )
+    say("identifying the vehicle on the training windows")
+    found, imported = _identified(imported, words)
+    kept = store(imported, folder / "recording")
+    runs = imported.recordings
+    choices, left_out = runnable(runs[0], target)
+    tuned = []
+    for choice, spec in choices.items():
+        if spec.declaration.baseline or not searched(choice):
+            continue
+        say(f"tuning {choice}")
+        try:
+            tuned.append(tune(choice, runs, target, draws=budget))
+        except InputError as error:
+            words.append(f"{choice} was not tuned: {error}.")
+    specs = list(choices.values())
+    for one in tuned:
+        path = folder / "variants" / f"{one.method.replace(':', '-')}.toml"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_variant(one, path)
+        specs.append(choose_method(str(path)))
+        if one.undetermined:
+            words.append(
+                f"{one.method}: {', '.join(one.undetermined)} ended at an end of the range, so the "
+                "training windows do not settle it."
+            )
+    say("scoring on the test windows")
+    scenario = recorded_scenario(str(kept))
+    rows: list[Row] = []
+    plan = Plan((scenario,), tuple(specs), range(scenario.runs))
+    run_plan(plan, Store(folder / "results"), Backend("loky", workers), on_row=rows.append)
+    return Study(imported, found, tuple(tuned), tuple(rows), left_out, tuple(words), folder, target)
+
+
+def runnable(recording: Recording, target: str) -> tuple[dict[str, MethodSpec], dict[str, str]]:
+    """Return the methods that a recording can run, and what the others lack, by choice.
+
+    Of each method it is the first form, the method itself or a variant with other sensors, whose
+    channels and vehicle parameters are there.
+    """
+    channels = recording.observations.dtype.names or ()
+    found: dict[str, MethodSpec] = {}
+    lacking: dict[str, str] = {}
+    for name, method in built_in_methods().items():
+        if target not in method.estimates:
+            continue
+        others = [key for key, one in method.variants.items() if one.sensors is not None]
+        reasons = []
+        for choice in (name, *(f"{name}:{key}" for key in others)):
+            spec = choose_method(choice)
+            reason = missing(spec.declaration, recording.vehicle, channels)
+            if not reason:
+                found[choice] = spec
+                break
+            reasons.append(f"{choice}: {reason}" if choice != name else reason)
+        else:
+            lacking[name] = "; or ".join(reasons)
+    return found, lacking
+
+
+def _halved(recording: Recording) -> Recording:
+    end = float(recording.truth["time"][-1])
+    start = recording.score_from
+    middle = 0.5 * (start + end)
+    return replace(recording, windows={"train": ((start, middle),), "test": ((middle, end),)})
+
+
+def _identified(imported: ImportedLog, words: list[str]) -> tuple[Identified | None, ImportedLog]:
+    """Return what was identified, and the log with it in its vehicle."""
+    runs = imported.recordings
+    if not with_velocity(runs):
+        words.append("Without a velocity or sideslip reference no tyres were identified.")
+        return None, imported
+    try:
+        found = identify_tyres(runs)
+    except InputError as error:
+        words.append(f"Nothing was identified: {error}.")
+        return None, imported
+    loose = found.undetermined()
+    if loose is not None:
+        words.append(f"{loose[:1].upper()}{loose[1:]}.")
+    mass = runs[0].vehicle.get("mass")
+    if mass is None:
+        words.append("The vehicle gives no mass, so the tyres found are not in force.")
+        return found, imported
+    vehicle = dict(runs[0].vehicle)
+    for name, parameter in _ON_PAPER.items():
+        value = found.values.get(name)
+        if value is not None and found.deviations[name] <= LOOSE * abs(value):
+            vehicle[parameter] = mass * value
+        elif value is not None:
+            words.append(f"{parameter} stays as on paper, for the log does not settle it.")
+    car = CarOnPaper(vehicle)
+    return found, replace(imported, recordings=tuple(replace(r, vehicle=car) for r in runs))
+
+
+def address(study: Study) -> str:
+    """Return the choice of its recording for other commands."""
+    return f"{PREFIX}{study.folder / 'recording'}"
