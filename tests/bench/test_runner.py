@@ -231,7 +231,7 @@ def _a_loky_worker():
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 def test_twenty_kills_between_rows_of_parent_and_workers_change_nothing(short_scenario, tmp_path):
-    seeds = 4000
+    seeds = 600
     run = ["run", "--scenario", short_scenario, "--method", "slip_slope", "--seeds", str(seeds)]
     command = [sys.executable, "-m", "gripbench.bench.command_line", *run, "--workers", "2"]
     results = tmp_path / "killed"

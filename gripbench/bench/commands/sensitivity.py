@@ -89,7 +89,7 @@ def sensitivity(
         write_atomically(export, frame.to_csv(index=False, float_format="%.6g"))
 
 
-def _target_of(specs: list) -> str:  # type: ignore[type-arg]
+def _target_of(specs: list[Any]) -> str:
     preferred = ("mu_front", "mu", "sideslip", "force_x_front")
     if not specs:
         return preferred[0]
@@ -166,7 +166,7 @@ def _print_radius(out, frame: pd.DataFrame, label: str, target: str) -> None:  #
     out.print(
         f"{label}: wheel radius on paper -0.2, 0, +0.2 % off: RMS "
         f"{', '.join(significant(one) for one in rms.values())}; best baseline "
-        f"{significant(factor * line['rms_baseline'])} ({line['baseline'] or 'none'})",
+        f"{significant(factor * float(str(line['rms_baseline'])))} ({line['baseline'] or 'none'})",
         markup=False,
     )
 
@@ -183,7 +183,7 @@ def _breaking(table: pd.DataFrame, target: str):  # type: ignore[no-untyped-def]
         title=escape(f"{target}: breaking point over the range of the cause; -: beyond 4"),
     )  # fmt: skip
     for label, line in table[worst].iterrows():
-        behind = not (table.loc[label] > 0.0).any()
+        behind = not (table.loc[str(label)] > 0.0).any()
         cells = ["-" if not one < 1e9 else f"{one:.2f}" for one in line]
         shown.add_row(str(label), *(["behind"] * len(worst) if behind else cells))
     return shown

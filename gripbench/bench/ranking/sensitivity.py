@@ -279,7 +279,7 @@ def summary_of(frame: pd.DataFrame, label: str) -> pd.DataFrame:
         best = rivals[rivals["cause"] == cause].set_index(["label", "multiple"])["rms"]
         floor = best.unstack("label").min(axis=1) if len(best) else pd.Series(dtype=float)
         floor = floor.reindex(curve.index)
-        ratio = np.log(curve["rms"] / floor)
+        ratio = pd.Series(np.log(curve["rms"] / floor), curve.index)
         names = best.xs(0.0, level="multiple") if len(best) else best
         at = curve["deviation"]
         lines.append(
@@ -293,7 +293,7 @@ def summary_of(frame: pd.DataFrame, label: str) -> pd.DataFrame:
                 "nominal": curve["rms"][0.0],
                 "baseline": names.idxmin() if names.notna().any() else "",
                 "rms_baseline": names.min() if len(names) else math.nan,
-                "breaking_low": _crossing(at[::-1], ratio[::-1], -1.0),
+                "breaking_low": _crossing(at.iloc[::-1], ratio.iloc[::-1], -1.0),
                 "breaking_high": _crossing(at, ratio, 1.0),
             }
         )

@@ -43,7 +43,7 @@ def deadline(limit: float) -> Iterator[None]:
             watch.end()
 
 
-class _Clock(event.Listener):  # type: ignore[misc]
+class _Clock(event.Listener):
     """Time [s] that the calling code has taken, without that of compilation."""
 
     def __init__(self) -> None:

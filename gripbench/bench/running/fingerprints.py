@@ -57,7 +57,7 @@ def scenario_digest(scenario: Scenario) -> str:
     world = worlds.known_worlds()[scenario.world]
     classes: tuple[Any, ...] = (world.scenario, world.simulation)
     files = [Path(inspect.getfile(item)) for item in classes]
-    content = {
+    content: dict[str, Any] = {
         "scenario": scenario.model_dump(mode="json"),
         "sensors": {name: item.model_dump() for name, item in scenario.all_sensors().items()},
         "vehicle": load_vehicle(scenario.vehicle).values(),

@@ -285,7 +285,7 @@ def _forget_compiled(declaration: Declaration) -> None:
         if file and Path(file) in read:
             for value in list(vars(module).values()):
                 if isinstance(value, Dispatcher):
-                    value._cache = NullCache()
+                    value._cache = NullCache()  # type: ignore[attr-defined]
 
 
 def _compile(method: Any) -> None:

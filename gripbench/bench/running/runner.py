@@ -29,8 +29,8 @@ from gripbench.envs.scenarios import Scenario
 from gripbench.errors import InputError
 from gripbench.sources import changed_since_start
 
-CHUNK = 4
-"""Seeds in a chunk of work, where no method runs isolated."""
+CHUNK = 8
+"""Cells in a chunk of work, about, where no method runs isolated: what a kill can cost."""
 
 RETRIES = 3
 """How often a run goes on after worker processes were lost and no row came back."""
@@ -216,7 +216,8 @@ def _chunks(
     recordings = groupby(waiting[alone:], key=lambda cell: cell.recording)
     tasks = (task(cells) for _, cells in recordings)
     isolated = any(method.isolated for method in plan.methods)
-    size = 1 if isolated or logs or backend.processes == 1 else CHUNK
+    single = isolated or logs or backend.processes == 1
+    size = 1 if single else max(1, CHUNK // len(plan.methods))
     while chunk := tuple(islice(tasks, size)):
         yield chunk
 

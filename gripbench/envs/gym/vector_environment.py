@@ -104,8 +104,8 @@ class VehicleVectorEnvironment(VectorEnv[Observations, npt.NDArray[np.float64], 
         self._ended = np.zeros(self.num_envs, bool)
         self._started = False
 
-    @property
-    def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override, misc]
+    @property  # type: ignore[misc]
+    def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
         """The stream of each lane."""
         return tuple(self._stream(lane) for lane in range(self.num_envs))
 

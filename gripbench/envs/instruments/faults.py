@@ -369,7 +369,8 @@ class Faults:
         self._samples = 0
         steps = round(horizon / sample_time) + 1
         self._jitter, self._swaps = np.zeros(0), np.zeros(0)
-        ops, events = [], []
+        ops: list[Any] = []
+        events: list[tuple[float, float, float, float]] = []
         for one in chosen:
             check_present(one, names)
             strength = one.strength

@@ -277,6 +277,8 @@ class BicycleSimulation(Simulation):
         self.sample_time = scenario.sample_time
         self._parts = round(scenario.sample_time / plant.STEP)
         self._plant = _plant_record(vehicle)
+        self._run: Any = None
+        self._decided = -1
 
     def reset(self, seed: int) -> npt.NDArray[Any]:
         """Start a run; return its first sample, shape (1,)."""
@@ -287,9 +289,8 @@ class BicycleSimulation(Simulation):
 
     def drive(self) -> npt.NDArray[np.float64]:
         """Return the driver's next action, shape (1,)."""
-        if (
-            self._decided != self._sample
-        ):  # the driver's arms move once a sample, however often asked
+        # the driver's arms move once a sample, however often asked
+        if self._decided != self._sample:
             decide(self._run, self._sample)
             self._decided = self._sample
         return self._run.action[:1].copy()

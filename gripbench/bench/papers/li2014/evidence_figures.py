@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from gripbench.compilation import compiled
 from gripbench.envs.instruments.sensors import Sensor
-from gripbench.envs.plants.longitudinal.plant import compiled, plant_record
+from gripbench.envs.plants.longitudinal.plant import plant_record
 from gripbench.envs.plants.longitudinal.world import LongitudinalScenario, LongitudinalSimulation
 from gripbench.envs.recordings import Recording
 from gripbench.envs.vehicles import GRAVITY, Vehicle, load_vehicle

@@ -18,9 +18,8 @@ from math import isfinite
 
 import numpy as np
 
-from gripbench.compilation import inlined
+from gripbench.compilation import compiled, inlined
 from gripbench.envs.plants.longitudinal.plant import (
-    compiled,
     derivatives,
     evaluate_tyres,
     gravity_along,

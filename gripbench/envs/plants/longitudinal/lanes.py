@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gripbench.envs.plants.longitudinal.plant import INPUT_TYPE, TYRE_TYPE, compiled
+from gripbench.compilation import compiled
+from gripbench.envs.plants.longitudinal.plant import INPUT_TYPE, TYRE_TYPE
 from gripbench.envs.plants.longitudinal.world import (
     NOISE_BLOCK,
     TRUTH_TYPE,

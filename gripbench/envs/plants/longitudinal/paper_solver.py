@@ -18,8 +18,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from gripbench.compilation import compiled
 from gripbench.envs.drivers.profiles import profile_value
-from gripbench.envs.plants.longitudinal.plant import compiled, derivatives
+from gripbench.envs.plants.longitudinal.plant import derivatives
 
 TOLERANCE = 1e-3
 FIRST_STEP = 1e-3

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field, field_validator, model_validator
 
+from gripbench.compilation import compiled
 from gripbench.configuration import Configuration
 from gripbench.envs.drivers.profiles import (
     Segment,
@@ -29,7 +30,6 @@ from gripbench.envs.plants.longitudinal.paper_solver import (
 from gripbench.envs.plants.longitudinal.plant import (
     INPUT_TYPE,
     TYRE_TYPE,
-    compiled,
     evaluate_tyres,
     gravity_along,
     plant_record,
