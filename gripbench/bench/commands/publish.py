@@ -51,6 +51,7 @@ def publish(
 
     from gripbench.bench.catalogue.registry import load_suite, suite_files
     from gripbench.bench.papers.claims import paper_files
+    from gripbench.bench.publishing.dataset import write_dataset
     from gripbench.bench.publishing.leaderboard import build, write
     from gripbench.bench.publishing.manifest import manifest, write_manifest
     from gripbench.bench.publishing.report.content import chosen_targets, rows_of_suites
@@ -89,6 +90,7 @@ def publish(
     rows = rows[rows["seed"] < seeds]
     targets = chosen_targets(rows, suites)
     files = write(results, *build(rows, runtimes, CONFIDENCE, targets))
+    files += write_dataset(results, rows)
     say("leaderboard" if runtimes else "leaderboard, without runtimes: give --timings")
     configuration = {name: load_suite(name).model_dump(mode="json") for name in suites}
     write_manifest(results, manifest(configuration, dict.fromkeys(suites, seeds)), files)
