@@ -111,7 +111,7 @@ def _single(step: Callable[..., Any]) -> Callable[..., Any]:
     import numba
 
     @numba.njit(nogil=True, error_model="numpy")
-    def single(state, obs, params, est, values, memory, layout):  # type: ignore[no-untyped-def]
+    def single(state, obs, params, est, values, memory, layout):
         if admit(values[0], memory, layout):
             step(state[0], obs[0], params[0], est[0])
 
@@ -123,7 +123,7 @@ def _loop(step: Callable[..., Any]) -> Callable[..., Any]:
     import numba
 
     @numba.njit(nogil=True, error_model="numpy")
-    def loop(state, obs, params, est, values, memory, layout, whole):  # type: ignore[no-untyped-def]
+    def loop(state, obs, params, est, values, memory, layout, whole):
         for k in range(obs.shape[0]):
             if k > 0 and not whole[()]:
                 est[k] = est[k - 1]

@@ -49,7 +49,7 @@ _STATE = np.dtype(
 
 
 @compiled
-def _advance(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _advance(state, obs, params, est):
     filter, parameter, inputs = state.filter, state.parameter, state.inputs
     x, P, y, h = filter.x, filter.P, parameter.x, parameter.h
     span = obs.elapsed
@@ -81,19 +81,19 @@ def _advance(state, obs, params, est):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _step(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step(state, obs, params, est):
     read_fused(state.inputs, obs, params)
     _advance(state, obs, params, est)
 
 
 @compiled
-def _step_measured(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step_measured(state, obs, params, est):
     read_measured(state.inputs, obs, params)
     _advance(state, obs, params, est)
 
 
 @compiled
-def _step_gps(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step_gps(state, obs, params, est):
     read_gps(state.inputs, obs, params)
     _advance(state, obs, params, est)
 

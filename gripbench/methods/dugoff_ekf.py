@@ -73,7 +73,7 @@ DUGOFF_PARAMETERS = (
 
 
 @compiled
-def evaluate(state, params):  # type: ignore[no-untyped-def]
+def evaluate(state, params):
     """Evaluate the model at the state and the inputs in `state`: rate, slope and wheels."""
     x = state.filter.x
     rate, slope, wheels = state.rate, state.slope, state.wheels
@@ -140,7 +140,7 @@ def evaluate(state, params):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _read_inputs(state, obs, params, share):  # type: ignore[no-untyped-def]
+def _read_inputs(state, obs, params, share):
     """Move the inputs by a share of the way to those of a sample."""
     state.steer_angle += share * (obs.steer_angle - state.steer_angle)
     state.accel_x += share * (obs.accel_x - state.accel_x)
@@ -153,7 +153,7 @@ def _read_inputs(state, obs, params, share):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _predict(state, obs, params):  # type: ignore[no-untyped-def]
+def _predict(state, obs, params):
     """Advance states and covariance to a sample (eq. 11) from the model's last evaluation."""
     elapsed = obs.time - state.time
     filter = state.filter
@@ -183,7 +183,7 @@ def _predict(state, obs, params):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _correct(state, obs, params):  # type: ignore[no-untyped-def]
+def _correct(state, obs, params):
     # Noise densities: a reading that is held over several samples counts as one.
     filter = state.filter
     x, h = filter.x, filter.h
@@ -195,7 +195,7 @@ def _correct(state, obs, params):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _used(wheels, i):  # type: ignore[no-untyped-def]
+def _used(wheels, i):
     """Return the used friction of a wheel, 0 for one in the air."""
     if wheels[i, 2] <= 0.0:
         return 0.0
@@ -203,7 +203,7 @@ def _used(wheels, i):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _step(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step(state, obs, params, est):
     filter = state.filter
     x, P, wheels = filter.x, filter.P, state.wheels
     if state.samples == 0.0:

@@ -47,7 +47,7 @@ STATE = np.dtype(
 
 
 @compiled
-def start(state, params):  # type: ignore[no-untyped-def]
+def start(state, params):
     """Set the first covariances and the constant entries of the model."""
     start_friction(state, params)
     kalman = state.filter
@@ -61,7 +61,7 @@ def start(state, params):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def advance(kalman, torque_front, torque_rear, elapsed, params):  # type: ignore[no-untyped-def]
+def advance(kalman, torque_front, torque_rear, elapsed, params):
     """Predict over `elapsed` seconds, eq. 16 and 18 (forward Euler), torques [N m] held."""
     F, Q = kalman.F, kalman.Q
     lever = params.wheel_radius / params.wheel_inertia
@@ -79,7 +79,7 @@ def advance(kalman, torque_front, torque_rear, elapsed, params):  # type: ignore
 
 
 @compiled
-def measure(kalman, accel_x, wheel_front, wheel_rear, speed, params):  # type: ignore[no-untyped-def]
+def measure(kalman, accel_x, wheel_front, wheel_rear, speed, params):
     """Take a_x, w_f and w_r one after the other (their noises are independent), eq. 20."""
     h, x = kalman.h, kalman.x
     for i in range(5):
@@ -99,7 +99,7 @@ def measure(kalman, accel_x, wheel_front, wheel_rear, speed, params):  # type: i
 
 
 @compiled
-def _finish(state, obs, elapsed, params, est):  # type: ignore[no-untyped-def]
+def _finish(state, obs, elapsed, params, est):
     kalman = state.filter
     slip_front, slip_rear = axle_slips(
         obs.wheel_speed_front, obs.wheel_speed_rear, obs.speed_gps, params
@@ -112,7 +112,7 @@ def _finish(state, obs, elapsed, params, est):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _step(state, obs, accel_x, params, est):  # type: ignore[no-untyped-def]
+def _step(state, obs, accel_x, params, est):
     kalman = state.filter
     elapsed = obs.elapsed
     if obs.first:
@@ -126,13 +126,13 @@ def _step(state, obs, accel_x, params, est):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def step(state, obs, params, est):  # type: ignore[no-untyped-def]
+def step(state, obs, params, est):
     """Take one sample with the accelerometer's reading."""
     _step(state, obs, obs.accel_x, params, est)
 
 
 @compiled
-def step_printed(state, obs, params, est):  # type: ignore[no-untyped-def]
+def step_printed(state, obs, params, est):
     """Take one sample with the rate of change of speed, as the printed form needs it."""
     _step(state, obs, obs.speed_x_rate, params, est)
 

@@ -59,7 +59,7 @@ _LEAST_MU, _LARGEST_MU = 0.03, 1.2
 
 
 @compiled
-def brush_force(slip_angle, mu, load, stiffness, printed):  # type: ignore[no-untyped-def]
+def brush_force(slip_angle, mu, load, stiffness, printed):
     """Return the lateral force of a brush tyre, eq. 15, and its derivative to the friction.
 
     Parameters
@@ -90,7 +90,7 @@ def brush_force(slip_angle, mu, load, stiffness, printed):  # type: ignore[no-un
 
 
 @compiled
-def lateral_acceleration(mu, slip_front, slip_rear, steer, params):  # type: ignore[no-untyped-def]
+def lateral_acceleration(mu, slip_front, slip_rear, steer, params):
     """Return the lateral acceleration of eq. 16 [m/s^2] and its derivative to the friction."""
     wheelbase = params.cg_to_front + params.cg_to_rear
     weight = params.mass * GRAVITY
@@ -108,7 +108,7 @@ def lateral_acceleration(mu, slip_front, slip_rear, steer, params):  # type: ign
 
 
 @compiled
-def slip_angles(speed_x, speed_y, yaw_rate, steer, params):  # type: ignore[no-untyped-def]
+def slip_angles(speed_x, speed_y, yaw_rate, steer, params):
     """Return the slip angles of the axles [rad], eq. 14 without its small angles."""
     front = steer - np.arctan2(speed_y + params.cg_to_front * yaw_rate, speed_x)
     rear = -np.arctan2(speed_y - params.cg_to_rear * yaw_rate, speed_x)
@@ -116,15 +116,13 @@ def slip_angles(speed_x, speed_y, yaw_rate, steer, params):  # type: ignore[no-u
 
 
 @compiled
-def friction_predict(friction, elapsed, params):  # type: ignore[no-untyped-def]
+def friction_predict(friction, elapsed, params):
     """Advance the friction, a random walk, over `elapsed` [s]."""
     friction.variance += params.mu_walk**2 * elapsed
 
 
 @compiled
-def friction_update(  # type: ignore[no-untyped-def]
-    friction, accel_y, slip_front, slip_rear, steer, variance, params
-):
+def friction_update(friction, accel_y, slip_front, slip_rear, steer, variance, params):
     """Take a measured lateral acceleration [m/s^2] with its variance; return whether it was used.
 
     It is not where it says nothing about the friction, |d a_y / d mu| below `least_slope`.
@@ -142,9 +140,7 @@ def friction_update(  # type: ignore[no-untyped-def]
 
 
 @compiled
-def friction_step(  # type: ignore[no-untyped-def]
-    friction, time, speed_x, speed_y, yaw_rate, steer, accel_y, params
-):
+def friction_step(friction, time, speed_x, speed_y, yaw_rate, steer, accel_y, params):
     """Advance the friction filter by one sample.
 
     Parameters

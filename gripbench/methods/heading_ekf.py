@@ -133,7 +133,7 @@ UNGATED = 1e300
 
 
 @compiled
-def field_in_vehicle(yaw, roll, pitch, horizontal, up, printed):  # type: ignore[no-untyped-def]
+def field_in_vehicle(yaw, roll, pitch, horizontal, up, printed):
     """Return the Earth's field in vehicle axes, eq. 5 (eq. 6 at zero pitch).
 
     Parameters
@@ -159,7 +159,7 @@ def field_in_vehicle(yaw, roll, pitch, horizontal, up, printed):  # type: ignore
 
 
 @compiled
-def heading_predict(heading, yaw_rate, roll_rate, accel_y, elapsed, params):  # type: ignore[no-untyped-def]
+def heading_predict(heading, yaw_rate, roll_rate, accel_y, elapsed, params):
     """Advance yaw and roll by eq. 7 over `elapsed` [s].
 
     Parameters
@@ -195,7 +195,7 @@ def heading_predict(heading, yaw_rate, roll_rate, accel_y, elapsed, params):  # 
 
 
 @compiled
-def heading_update_field(heading, x, y, z, params):  # type: ignore[no-untyped-def]
+def heading_update_field(heading, x, y, z, params):
     """Take a magnetometer measurement [T]; return whether it passed the gate (eq. 4)."""
     f = heading.filter
     printed = params.printed_6 > 0.0
@@ -231,7 +231,7 @@ def heading_update_field(heading, x, y, z, params):  # type: ignore[no-untyped-d
 
 
 @compiled
-def heading_update_roll(heading, roll, variance):  # type: ignore[no-untyped-def]
+def heading_update_roll(heading, roll, variance):
     """Take a measurement of the roll [rad] with its variance [rad^2]."""
     f = heading.filter
     f.h[0] = 0.0
@@ -240,7 +240,7 @@ def heading_update_roll(heading, roll, variance):  # type: ignore[no-untyped-def
 
 
 @compiled
-def _align(heading, obs, params):  # type: ignore[no-untyped-def]
+def _align(heading, obs, params):
     """Average the level field over the first samples, turned back by the gyroscope."""
     f = heading.filter
     along = obs.magnetic_field_x + params.field_up * np.sin(heading.pitch)
@@ -265,7 +265,7 @@ def _align(heading, obs, params):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _follow_pitch(heading, obs, elapsed, params):  # type: ignore[no-untyped-def]
+def _follow_pitch(heading, obs, elapsed, params):
     """Follow the road's pitch: gyroscope between the late GPS samples of the vertical velocity."""
     roll = heading.filter.x[1]
     rate = obs.pitch_rate * np.cos(roll) - obs.yaw_rate * np.sin(roll)
@@ -295,7 +295,7 @@ def _follow_pitch(heading, obs, elapsed, params):  # type: ignore[no-untyped-def
 
 
 @compiled
-def heading_step(heading, obs, params):  # type: ignore[no-untyped-def]
+def heading_step(heading, obs, params):
     """Advance the heading filter by one sample of its sensors."""
     if heading.started == 0:
         heading.started = 1
@@ -329,13 +329,13 @@ def heading_step(heading, obs, params):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def wrapped(angle):  # type: ignore[no-untyped-def]
+def wrapped(angle):
     """Return an angle within -pi to pi [rad]."""
     return angle - 2.0 * np.pi * np.round(angle / (2.0 * np.pi))
 
 
 @compiled
-def _step(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step(state, obs, params, est):
     heading = state.heading
     heading_step(heading, obs, params)
     est.yaw = wrapped(heading.filter.x[0])

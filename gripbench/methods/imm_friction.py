@@ -53,7 +53,7 @@ _STATE = np.dtype(
 
 
 @compiled
-def _advance(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _advance(state, obs, params, est):
     filter, inputs, bank = state.filter, state.inputs, state.bank
     span = obs.elapsed
     if obs.first:
@@ -86,19 +86,19 @@ def _advance(state, obs, params, est):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _step(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step(state, obs, params, est):
     read_fused(state.inputs, obs, params)
     _advance(state, obs, params, est)
 
 
 @compiled
-def _step_measured(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step_measured(state, obs, params, est):
     read_measured(state.inputs, obs, params)
     _advance(state, obs, params, est)
 
 
 @compiled
-def _step_gps(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step_gps(state, obs, params, est):
     read_gps(state.inputs, obs, params)
     _advance(state, obs, params, est)
 

@@ -41,13 +41,13 @@ STATE = np.dtype([(name, np.float64) for name in _NAMES])
 
 
 @compiled
-def start(state, params):  # type: ignore[no-untyped-def]
+def start(state, params):
     """Set the first covariances."""
     start_friction(state, params)
 
 
 @compiled
-def step(state, obs, params, est):  # type: ignore[no-untyped-def]
+def step(state, obs, params, est):
     """Take one sample: forces by eq. 22, slip by eq. 5, friction by eq. 11-15."""
     elapsed = obs.elapsed
     if elapsed > 0.0:

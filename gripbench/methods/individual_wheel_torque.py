@@ -38,7 +38,7 @@ STATE = np.dtype(
 
 
 @inlined
-def observer(wheel_speed, force, measured, torque, elapsed, params):  # type: ignore[no-untyped-def]
+def observer(wheel_speed, force, measured, torque, elapsed, params):
     """Return wheel speed and force of an axle after one trapezoidal step of eq. 21.
 
     Parameters
@@ -64,13 +64,13 @@ def observer(wheel_speed, force, measured, torque, elapsed, params):  # type: ig
 
 
 @compiled
-def start(state, params):  # type: ignore[no-untyped-def]
+def start(state, params):
     """Set the first covariances."""
     start_friction(state, params)
 
 
 @compiled
-def step(state, obs, params, est):  # type: ignore[no-untyped-def]
+def step(state, obs, params, est):
     """Take one sample: forces by eq. 21, slip by eq. 5, friction by eq. 11-15."""
     elapsed = obs.elapsed
     if obs.first:

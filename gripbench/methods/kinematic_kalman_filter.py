@@ -67,7 +67,7 @@ KINEMATIC_PARAMETERS = (
 
 
 @compiled
-def start_kinematic(state, params):  # type: ignore[no-untyped-def]
+def start_kinematic(state, params):
     """Set the first values of a kinematic filter."""
     filter = state.filter
     filter.x[2] = params.gyro_scale
@@ -80,7 +80,7 @@ def start_kinematic(state, params):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def advance_kinematic(state, obs, params):  # type: ignore[no-untyped-def]
+def advance_kinematic(state, obs, params):
     """Take one sample; return whether it brought a course that was used."""
     filter = state.filter
     x = filter.x
@@ -129,7 +129,7 @@ def advance_kinematic(state, obs, params):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _step(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step(state, obs, params, est):
     advance_kinematic(state, obs, params)
     filter = state.filter
     est.sideslip = state.sideslip

@@ -36,7 +36,7 @@ _STATE = np.dtype([("inputs", INPUT_STATE), ("filter", filter_type(2)), ("deviat
 
 
 @compiled
-def _advance(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _advance(state, obs, params, est):
     filter, inputs = state.filter, state.inputs
     x, P, h = filter.x, filter.P, filter.h
     span, speed, rate = obs.elapsed, inputs.speed, obs.yaw_rate
@@ -64,19 +64,19 @@ def _advance(state, obs, params, est):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _step(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step(state, obs, params, est):
     read_fused(state.inputs, obs, params)
     _advance(state, obs, params, est)
 
 
 @compiled
-def _step_measured(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step_measured(state, obs, params, est):
     read_measured(state.inputs, obs, params)
     _advance(state, obs, params, est)
 
 
 @compiled
-def _step_gps(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step_gps(state, obs, params, est):
     read_gps(state.inputs, obs, params)
     _advance(state, obs, params, est)
 

@@ -52,7 +52,7 @@ CASCADE_STATE = np.dtype(
 
 
 @compiled
-def _step(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step(state, obs, params, est):
     heading, sideslip, friction = state.heading, state.sideslip, state.friction
     heading_step(heading, obs, params)
     yaw, roll = heading.filter.x[0], heading.filter.x[1]

@@ -82,7 +82,7 @@ MODEL_BASED_PARAMETERS = (
 
 
 @compiled
-def start_model_based(state, params):  # type: ignore[no-untyped-def]
+def start_model_based(state, params):
     """Set the first values of a model-based filter."""
     P = state.filter.P
     P[0, 0] = params.sideslip_std**2
@@ -91,7 +91,7 @@ def start_model_based(state, params):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def single_track(model, mass, inertia, a, b, front, rear, speed):  # type: ignore[no-untyped-def]
+def single_track(model, mass, inertia, a, b, front, rear, speed):
     """Fill the continuous model of sideslip, yaw rate, heading under steering and bank.
 
     Parameters
@@ -118,7 +118,7 @@ def single_track(model, mass, inertia, a, b, front, rear, speed):  # type: ignor
 
 
 @compiled
-def advance_model_based(state, obs, params, bank, front, rear):  # type: ignore[no-untyped-def]
+def advance_model_based(state, obs, params, bank, front, rear):
     """Take one sample with the given bank [rad] and stiffness; return whether a course was used."""
     filter = state.filter
     x, h = filter.x, filter.h
@@ -211,7 +211,7 @@ def advance_model_based(state, obs, params, bank, front, rear):  # type: ignore[
 
 
 @compiled
-def report_model_based(state, est, params, front, rear):  # type: ignore[no-untyped-def]
+def report_model_based(state, est, params, front, rear):
     """Write the estimates of a model-based filter."""
     x, P = state.filter.x, state.filter.P
     speed = max(state.speed, params.lowest_speed)
@@ -252,14 +252,14 @@ MODEL_BASED_VARIANCES = (
 
 
 @compiled
-def _step(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step(state, obs, params, est):
     front, rear = params.cornering_stiffness_front, params.cornering_stiffness_rear
     advance_model_based(state, obs, params, 0.0, front, rear)
     report_model_based(state, est, params, front, rear)
 
 
 @compiled
-def _step_with_bank(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step_with_bank(state, obs, params, est):
     front, rear = params.cornering_stiffness_front, params.cornering_stiffness_rear
     advance_model_based(state, obs, params, obs.road_bank, front, rear)
     report_model_based(state, est, params, front, rear)

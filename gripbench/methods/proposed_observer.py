@@ -66,7 +66,7 @@ STATE = np.dtype([(name, np.float64) for name in _NAMES])
 
 
 @inlined
-def observed_speed(  # type: ignore[no-untyped-def]
+def observed_speed(
     speed, torque, wheel_acceleration, accel_x, mean_accel_x, grade, elapsed, params
 ):
     """Return v_hat [m/s] after one backward Euler step of eq. 24 (corrected).
@@ -100,7 +100,7 @@ def observed_speed(  # type: ignore[no-untyped-def]
 
 
 @inlined
-def adapted_stiffness(stiffness, slip, force, elapsed, params):  # type: ignore[no-untyped-def]
+def adapted_stiffness(stiffness, slip, force, elapsed, params):
     """Return k [N] after one backward Euler step of k_dot = -K_e sign(s) (k s - F).
 
     With `normalised` the error is taken over the slip, k_dot = -K_e (k - F/s): k then settles at
@@ -129,14 +129,14 @@ def adapted_stiffness(stiffness, slip, force, elapsed, params):  # type: ignore[
 
 
 @compiled
-def start(state, params):  # type: ignore[no-untyped-def]
+def start(state, params):
     """Set the first stiffness, C_s, and the first covariances."""
     state.stiffness = params.longitudinal_stiffness
     start_friction(state, params)
 
 
 @compiled
-def _step(state, obs, wheel_acceleration, slip_speed, params, est):  # type: ignore[no-untyped-def]
+def _step(state, obs, wheel_acceleration, slip_speed, params, est):
     torque = obs.torque_front + obs.torque_rear
     if obs.first:
         state.speed = params.wheel_radius * obs.wheel_speed_front
@@ -167,7 +167,7 @@ def _step(state, obs, wheel_acceleration, slip_speed, params, est):  # type: ign
 
 
 @compiled
-def step(state, obs, params, est):  # type: ignore[no-untyped-def]
+def step(state, obs, params, est):
     """Take one sample; the wheel accelerations are differences of the wheel speeds."""
     elapsed = obs.elapsed
     if elapsed > 0.0:
@@ -182,14 +182,14 @@ def step(state, obs, params, est):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def step_idealised(state, obs, params, est):  # type: ignore[no-untyped-def]
+def step_idealised(state, obs, params, est):
     """Take one sample with the model's own wheel accelerations, as the paper does."""
     acceleration = obs.wheel_acceleration_front + obs.wheel_acceleration_rear
     _step(state, obs, acceleration, -1.0, params, est)
 
 
 @compiled
-def step_gps(state, obs, params, est):  # type: ignore[no-untyped-def]
+def step_gps(state, obs, params, est):
     """Take one sample with the GPS speed in the slip: the remark for a noisy accelerometer."""
     acceleration = obs.wheel_acceleration_front + obs.wheel_acceleration_rear
     _step(state, obs, acceleration, obs.speed_gps, params, est)

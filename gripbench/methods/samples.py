@@ -67,7 +67,7 @@ def regular(values: npt.NDArray[np.float64]) -> bool:
 
 
 @compiled
-def admit(row, memory, layout):  # type: ignore[no-untyped-def]
+def admit(row, memory, layout):
     """Complete a sample in place and return whether a step may take it.
 
     Parameters

@@ -75,17 +75,17 @@ _STATE = np.dtype(
 
 
 @compiled
-def _start(state, params):  # type: ignore[no-untyped-def]
+def _start(state, params):
     _start_bank(state, params, params.friction_mean, params.friction_spread)
 
 
 @compiled
-def _start_prior(state, params):  # type: ignore[no-untyped-def]
+def _start_prior(state, params):
     _start_bank(state, params, params.friction_prior, params.friction_prior_std)
 
 
 @compiled
-def _start_bank(state, params, mean, spread):  # type: ignore[no-untyped-def]
+def _start_bank(state, params, mean, spread):
     """Set every class to the same first state, and weights by the prior of the friction."""
     bank = state.bank
     total = 0.0
@@ -109,7 +109,7 @@ def _start_bank(state, params, mean, spread):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _unrolled(state, obs, params):  # type: ignore[no-untyped-def]
+def _unrolled(state, obs, params):
     """Return the specific force along y [m/s^2] without the share of g that the roll adds."""
     accel = obs.accel_y - GRAVITY * state.roll
     if accel != accel:
@@ -126,7 +126,7 @@ def _unrolled(state, obs, params):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _limits(mu, accel_x, params):  # type: ignore[no-untyped-def]
+def _limits(mu, accel_x, params):
     """Return what braking or traction leaves of the axles' friction across [N]."""
     load_front, load_rear = axle_loads(accel_x, params)
     share = params.drive_share_front if accel_x > 0.0 else params.brake_share_front
@@ -139,7 +139,7 @@ def _limits(mu, accel_x, params):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _evaluate(state, x, steer, speed, accel_x, params):  # type: ignore[no-untyped-def]
+def _evaluate(state, x, steer, speed, accel_x, params):
     front, rear = _limits(exp(x[MU]), accel_x, params)
     motion(
         speed, x, steer + x[STEER],
@@ -150,7 +150,7 @@ def _evaluate(state, x, steer, speed, accel_x, params):  # type: ignore[no-untyp
 
 
 @compiled
-def _row(state, row, h):  # type: ignore[no-untyped-def]
+def _row(state, row, h):
     """Copy a row of the motion's slopes into the order of the states."""
     out = state.motion
     h[V_Y], h[RATE], h[OFFSET] = out[row, 1], out[row, 2], 0.0
@@ -158,7 +158,7 @@ def _row(state, row, h):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _predict(state, j, span, steer, speed, accel_x, accel_y, params):  # type: ignore[no-untyped-def]
+def _predict(state, j, span, steer, speed, accel_x, accel_y, params):
     """Advance a hypothesis: kinematics for v_y, tyres for the yaw rate.
 
     Returns the log-likelihood of a sideslip that is usual.
@@ -202,7 +202,7 @@ def _predict(state, j, span, steer, speed, accel_x, accel_y, params):  # type: i
 
 
 @compiled
-def _correct(state, span, steer, speed, accel_x, accel_y, rate, params):  # type: ignore[no-untyped-def]
+def _correct(state, span, steer, speed, accel_x, accel_y, rate, params):
     """Take yaw rate and lateral force where they are known; return the log-likelihood."""
     filter = state.filter
     x, h = filter.x, filter.h
@@ -232,7 +232,7 @@ def _correct(state, span, steer, speed, accel_x, accel_y, rate, params):  # type
 
 
 @compiled
-def _advance(state, params):  # type: ignore[no-untyped-def]
+def _advance(state, params):
     """Take the mean of the samples of a window."""
     span, count = state.sum_span, state.sum_count
     steer, speed = state.sum_steer / count, state.sum_speed / count
@@ -251,7 +251,7 @@ def _advance(state, params):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _gather(state, obs, params):  # type: ignore[no-untyped-def]
+def _gather(state, obs, params):
     """Add a sample to the window; take the window when it is long enough."""
     advance_speed(state.speed, obs, params, state.speed_y)
     fusion = state.speed
@@ -285,7 +285,7 @@ def _gather(state, obs, params):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _step(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step(state, obs, params, est):
     _gather(state, obs, params)
     bank = state.bank
     forward = max(state.speed.filter.x[0], LOWEST_SPEED)

@@ -65,7 +65,7 @@ SIDESLIP_PARAMETERS = (
 
 
 @compiled
-def velocity_in_vehicle(yaw, roll, north, west, up):  # type: ignore[no-untyped-def]
+def velocity_in_vehicle(yaw, roll, north, west, up):
     """Return v_x and v_y [m/s] from the velocity in earth axes, eq. 10, at zero pitch."""
     forward = np.cos(yaw) * north + np.sin(yaw) * west
     level = -np.sin(yaw) * north + np.cos(yaw) * west
@@ -73,7 +73,7 @@ def velocity_in_vehicle(yaw, roll, north, west, up):  # type: ignore[no-untyped-
 
 
 @compiled
-def sideslip_predict(f, accel_x, accel_y, yaw_rate, elapsed, params):  # type: ignore[no-untyped-def]
+def sideslip_predict(f, accel_x, accel_y, yaw_rate, elapsed, params):
     """Advance velocities and biases by eq. 9 over `elapsed` [s] with constant inputs.
 
     The turn of the axes is exact, the acceleration is taken at half the turn: errors are of third
@@ -110,7 +110,7 @@ def sideslip_predict(f, accel_x, accel_y, yaw_rate, elapsed, params):  # type: i
 
 
 @compiled
-def sideslip_update(f, speed_x, speed_y, variance_x, variance_y):  # type: ignore[no-untyped-def]
+def sideslip_update(f, speed_x, speed_y, variance_x, variance_y):
     """Take a measurement of both velocities [m/s] with their variances [m^2/s^2], eq. 11."""
     f.h[:] = 0.0
     f.h[0] = 1.0
@@ -121,7 +121,7 @@ def sideslip_update(f, speed_x, speed_y, variance_x, variance_y):  # type: ignor
 
 
 @compiled
-def sideslip_estimate(f):  # type: ignore[no-untyped-def]
+def sideslip_estimate(f):
     """Return the sideslip angle [rad] of eq. 12 and its variance; zero below walking pace."""
     speed_x, speed_y = f.x[0], f.x[2]
     squared = speed_x**2 + speed_y**2
@@ -134,7 +134,7 @@ def sideslip_estimate(f):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _advance(sideslip, f, time, following, until, params):  # type: ignore[no-untyped-def]
+def _advance(sideslip, f, time, following, until, params):
     """Move a filter from `time` to `until` through the inputs from `following` on; return the next.
 
     The input in row k holds between the samples k - 1 and k.
@@ -153,7 +153,7 @@ def _advance(sideslip, f, time, following, until, params):  # type: ignore[no-un
 
 
 @compiled
-def _first_after(sideslip, time):  # type: ignore[no-untyped-def]
+def _first_after(sideslip, time):
     """Return the number of the first sample that is not before `time`."""
     length = sideslip.inputs.shape[0]
     oldest = max(sideslip.steps - length, 0)
@@ -164,7 +164,7 @@ def _first_after(sideslip, time):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _take(f, sideslip, number, time, north, west, up, params):  # type: ignore[no-untyped-def]
+def _take(f, sideslip, number, time, north, west, up, params):
     """Correct a filter that stands at `time` with a GPS velocity that was true then."""
     row = sideslip.inputs[number % sideslip.inputs.shape[0]]
     yaw = row[_YAW] - row[_YAW_RATE] * (row[_TIME] - time)
@@ -177,7 +177,7 @@ def _take(f, sideslip, number, time, north, west, up, params):  # type: ignore[n
 
 
 @compiled
-def _begin(sideslip, time, north, west, up, params):  # type: ignore[no-untyped-def]
+def _begin(sideslip, time, north, west, up, params):
     number = _first_after(sideslip, time)
     row = sideslip.inputs[number % sideslip.inputs.shape[0]]
     speed_x, speed_y = velocity_in_vehicle(row[_YAW], row[_ROLL], north, west, up)
@@ -193,7 +193,7 @@ def _begin(sideslip, time, north, west, up, params):  # type: ignore[no-untyped-
 
 
 @compiled
-def _replay(sideslip, params):  # type: ignore[no-untyped-def]
+def _replay(sideslip, params):
     """Bring the present filter from the age of the last measurement to the last sample."""
     sideslip.now.x[:] = sideslip.late.x
     sideslip.now.P[:] = sideslip.late.P
@@ -201,7 +201,7 @@ def _replay(sideslip, params):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _shift(sideslip, time, north, west, up, params):  # type: ignore[no-untyped-def]
+def _shift(sideslip, time, north, west, up, params):
     """Take a late measurement by Larsen's formula for a single one in flight.
 
     The gain is that of the time of the measurement, carried to the present by the transition in
@@ -249,9 +249,7 @@ def _shift(sideslip, time, north, west, up, params):  # type: ignore[no-untyped-
 
 
 @compiled
-def sideslip_step(  # type: ignore[no-untyped-def]
-    sideslip, time, accel_x, accel_y, yaw_rate, yaw, roll, yaw_variance, params
-):
+def sideslip_step(sideslip, time, accel_x, accel_y, yaw_rate, yaw, roll, yaw_variance, params):
     """Record the inputs that held since the last sample and advance the present filter.
 
     Parameters
@@ -292,7 +290,7 @@ def sideslip_step(  # type: ignore[no-untyped-def]
 
 
 @compiled
-def sideslip_gps(sideslip, gps_time, north, west, up, params):  # type: ignore[no-untyped-def]
+def sideslip_gps(sideslip, gps_time, north, west, up, params):
     """Take a GPS velocity [m/s] that was true at `gps_time` [s]; call after `sideslip_step`.
 
     Returns

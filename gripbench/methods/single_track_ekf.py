@@ -36,7 +36,7 @@ _STATE = np.dtype(
 
 
 @compiled
-def _advance(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _advance(state, obs, params, est):
     filter, inputs = state.filter, state.inputs
     span = obs.elapsed
     if obs.first:
@@ -54,19 +54,19 @@ def _advance(state, obs, params, est):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _step(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step(state, obs, params, est):
     read_fused(state.inputs, obs, params)
     _advance(state, obs, params, est)
 
 
 @compiled
-def _step_measured(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step_measured(state, obs, params, est):
     read_measured(state.inputs, obs, params)
     _advance(state, obs, params, est)
 
 
 @compiled
-def _step_gps(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step_gps(state, obs, params, est):
     read_gps(state.inputs, obs, params)
     _advance(state, obs, params, est)
 

@@ -46,7 +46,7 @@ _STATE = np.dtype(
 
 
 @compiled
-def linear_model(model, speed, params):  # type: ignore[no-untyped-def]
+def linear_model(model, speed, params):
     """Fill the (3, 3) continuous model of v_y, r and the held steering angle."""
     m, inertia = params.mass, params.yaw_inertia
     a, b = params.cg_to_front, params.cg_to_rear
@@ -61,7 +61,7 @@ def linear_model(model, speed, params):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _advance(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _advance(state, obs, params, est):
     filter, inputs = state.filter, state.inputs
     x, P, h = filter.x, filter.P, filter.h
     elapsed, speed = obs.elapsed, inputs.speed
@@ -100,19 +100,19 @@ def _advance(state, obs, params, est):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _step(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step(state, obs, params, est):
     read_fused(state.inputs, obs, params)
     _advance(state, obs, params, est)
 
 
 @compiled
-def _step_measured(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step_measured(state, obs, params, est):
     read_measured(state.inputs, obs, params)
     _advance(state, obs, params, est)
 
 
 @compiled
-def _step_gps(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step_gps(state, obs, params, est):
     read_gps(state.inputs, obs, params)
     _advance(state, obs, params, est)
 

@@ -57,7 +57,7 @@ _STATE = np.dtype(
 
 
 @inlined
-def _clear(state):  # type: ignore[no-untyped-def]
+def _clear(state):
     state.sum_span, state.sum_count = 0.0, 0.0
     state.sum_wheel_front, state.sum_wheel_rear = 0.0, 0.0
     state.sum_torque_front, state.sum_torque_rear = 0.0, 0.0
@@ -65,7 +65,7 @@ def _clear(state):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def inverse_slip(share, params):  # type: ignore[no-untyped-def]
+def inverse_slip(share, params):
     """Return the slip at which the tyre gives a share of its peak force, and d slip / d share.
 
     Parameters
@@ -88,12 +88,12 @@ def inverse_slip(share, params):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _start(state, params):  # type: ignore[no-untyped-def]
+def _start(state, params):
     _start_filter(state, params, params.friction_mean, params.friction_spread)
 
 
 @compiled
-def _start_filter(state, params, mean, spread):  # type: ignore[no-untyped-def]
+def _start_filter(state, params, mean, spread):
     x, P = state.filter.x, state.filter.P
     ratio = spread / mean
     x[FLEX] = (1.0 + ratio * ratio) / mean
@@ -111,7 +111,7 @@ def _start_filter(state, params, mean, spread):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _predict(state, span, accel, params):  # type: ignore[no-untyped-def]
+def _predict(state, span, accel, params):
     filter = state.filter
     x, F, Q = filter.x, filter.F, filter.Q
     for i in range(STATES):
@@ -127,7 +127,7 @@ def _predict(state, span, accel, params):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _gps(state, rate, params):  # type: ignore[no-untyped-def]
+def _gps(state, rate, params):
     """Take the mean of the new GPS speeds; `rate` is the rate of change of speed [m/s^2]."""
     if state.gps_count == 0.0:
         return
@@ -141,7 +141,7 @@ def _gps(state, rate, params):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _newton(state, span, force, accel, params):  # type: ignore[no-untyped-def]
+def _newton(state, span, force, accel, params):
     """Take the sum of the tyre forces [N] against mass and acceleration."""
     filter = state.filter
     x, h = filter.x, filter.h
@@ -155,7 +155,7 @@ def _newton(state, span, force, accel, params):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _axle(state, front, span, rolling, force, load, rate, params):  # type: ignore[no-untyped-def]
+def _axle(state, front, span, rolling, force, load, rate, params):
     """Take one axle; return the innovation of 1/mu over its deviation, along the force.
 
     Parameters
@@ -227,14 +227,14 @@ def _axle(state, front, span, rolling, force, load, rate, params):  # type: igno
 
 
 @inlined
-def _steady(turn, wheel, rate, params):  # type: ignore[no-untyped-def]
+def _steady(turn, wheel, rate, params):
     """Return a wheel's acceleration [rad/s^2]: that of the car unless the wheel spins or locks."""
     rolling = rate / params.wheel_radius
     return turn if abs(turn - rolling) > 10.0 + params.spin_share * abs(wheel) else rolling
 
 
 @compiled
-def _steepness(state, front, force, load, params):  # type: ignore[no-untyped-def]
+def _steepness(state, front, force, load, params):
     """Return the slope of an axle's force to its slip [N] at the end of the window."""
     x = state.filter.x
     peak = load * x[MASS] / x[FLEX]
@@ -250,7 +250,7 @@ def _steepness(state, front, force, load, params):  # type: ignore[no-untyped-de
 
 
 @compiled
-def _detect(state, evidence, variance, params):  # type: ignore[no-untyped-def]
+def _detect(state, evidence, variance, params):
     """Cumulate the evidence for a change of 1/mu; open its variance where it is enough."""
     state.rise = max(0.0, state.rise + evidence - params.drift)
     state.fall = max(0.0, state.fall - evidence - params.drift)
@@ -260,7 +260,7 @@ def _detect(state, evidence, variance, params):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _window(state, params, spread):  # type: ignore[no-untyped-def]
+def _window(state, params, spread):
     """Take the samples of a window; `spread` is the prior deviation of the friction."""
     filter = state.filter
     x, P = filter.x, filter.P
@@ -304,7 +304,7 @@ def _window(state, params, spread):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _forces(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _forces(state, obs, params, est):
     """Write the axle forces: torque balance, and what passes faster by wheels and accelerometer.
 
     Accelerometer and wheel speeds both see the fast part of the sum of the forces. What they have
@@ -345,7 +345,7 @@ def _forces(state, obs, params, est):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _gather(state, obs, gps, gps_new, params, spread):  # type: ignore[no-untyped-def]
+def _gather(state, obs, gps, gps_new, params, spread):
     """Add a sample to the window; take the window when it is long enough."""
     state.wheel_front, state.wheel_rear = obs.wheel_speed_front, obs.wheel_speed_rear
     filter = state.filter
@@ -375,7 +375,7 @@ def _gather(state, obs, gps, gps_new, params, spread):  # type: ignore[no-untype
 
 
 @compiled
-def _write(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _write(state, obs, params, est):
     x, P = state.filter.x, state.filter.P
     mu = 1.0 / x[FLEX]
     ratio = min(P[FLEX, FLEX] / x[FLEX] ** 2, 0.25)
@@ -388,13 +388,13 @@ def _write(state, obs, params, est):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _step(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step(state, obs, params, est):
     _gather(state, obs, obs.speed_gps, obs.speed_gps_new > 0.0, params, params.friction_spread)
     _write(state, obs, params, est)
 
 
 @compiled
-def _step_production(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step_production(state, obs, params, est):
     _gather(state, obs, 0.0, False, params, params.friction_spread)
     _write(state, obs, params, est)
 

@@ -37,14 +37,14 @@ STATE = np.dtype([(name, np.float64) for name in ("slope", "covariance", "mu")])
 
 
 @compiled
-def start(state, params):  # type: ignore[no-untyped-def]
+def start(state, params):
     """Set the first covariance."""
     state.covariance = params.covariance
     state.mu = params.slope_offset
 
 
 @compiled
-def step(state, obs, params, est):  # type: ignore[no-untyped-def]
+def step(state, obs, params, est):
     """Take one sample: total force by eq. 8, slip slope by eq. 10-14, friction by eq. 15."""
     slip_front = slip_ratio(params.wheel_radius * obs.wheel_speed_front, obs.speed_gps)
     slip_rear = slip_ratio(params.wheel_radius * obs.wheel_speed_rear, obs.speed_gps)

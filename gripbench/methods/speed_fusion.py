@@ -24,7 +24,7 @@ from gripbench.methods.contract import CompiledMethod, compiled
 
 
 @compiled
-def _step(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step(state, obs, params, est):
     advance_speed(state.speed, obs, params, state.speed_y)
     filter = state.speed.filter
     speed = max(filter.x[0], 0.0)

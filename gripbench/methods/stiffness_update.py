@@ -68,7 +68,7 @@ def _joined(*tables: tuple[Parameter, ...]) -> tuple[Parameter, ...]:
 
 
 @compiled
-def _start(state, params):  # type: ignore[no-untyped-def]
+def _start(state, params):
     start_kinematic(state.kinematic, params)
     start_model_based(state.model, params)
     for axle in range(2):
@@ -80,7 +80,7 @@ def _start(state, params):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _learn(state, params):  # type: ignore[no-untyped-def]
+def _learn(state, params):
     """Take the slip angles of the latest course, if the turn is steady."""
     kinematic = state.kinematic
     rate = (state.rate_sum / state.count - kinematic.filter.x[1]) / kinematic.filter.x[2]
@@ -104,14 +104,14 @@ def _learn(state, params):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _stiffness(state, axle):  # type: ignore[no-untyped-def]
+def _stiffness(state, axle):
     """Return the stiffness of an axle [N/rad]; the compliance is kept above zero."""
     compliance = state.weighted[axle] / state.information[axle]
     return 1.0 / max(compliance, 1e-7)
 
 
 @compiled
-def _step(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step(state, obs, params, est):
     used = advance_kinematic(state.kinematic, obs, params)
     state.rate_sum += obs.yaw_rate
     state.steer_sum += obs.steer_angle

@@ -17,7 +17,7 @@ from gripbench.methods.friction_ekf import (
 
 
 @compiled
-def _step(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step(state, obs, params, est):
     if obs.accel_y_new > 0.0:
         friction_step(
             state, obs.time, obs.speed_x, obs.speed_y, obs.yaw_rate, obs.steer_angle,

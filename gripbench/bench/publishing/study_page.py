@@ -5,14 +5,15 @@ from __future__ import annotations
 import base64
 import html
 import io
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 
 from gripbench.bench.catalogue.registry import choose_method
 from gripbench.bench.publishing.board_tables import board_table
+from gripbench.bench.publishing.columns import Column, Table
 from gripbench.bench.publishing.figures.style import TRUTH, line, new_figure, series_style, style
-from gripbench.bench.publishing.tables import Column, Table
 from gripbench.bench.publishing.tables import html as table_html
 from gripbench.bench.ranking.answers import words
 from gripbench.bench.ranking.ranking import Board, boards
@@ -75,7 +76,7 @@ def write_study(study: Study, board: Board, path: Path) -> None:
     write_atomically(path, page)
 
 
-def _list(sentences) -> str:  # type: ignore[no-untyped-def]
+def _list(sentences: Iterable[str]) -> str:
     items = "".join(f"<li>{html.escape(one)}</li>" for one in sentences)
     return f"<ul>{items}</ul>" if items else ""
 

@@ -161,13 +161,13 @@ INDEX, ARMS, OFFSET, ASTRAY, BEYOND, MEMORY = 0, 1, 2, 3, 4, 5
 
 
 @compiled
-def wrapped(angle):  # type: ignore[no-untyped-def]
+def wrapped(angle):
     """Return an angle within -pi to pi."""
     return angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
 
 
 @compiled
-def find_on_path(x, path, memory):  # type: ignore[no-untyped-def]
+def find_on_path(x, path, memory):
     """Move the driver's place on the path forward to the point beside the vehicle."""
     last = path.shape[0] - 2
     i = int(memory[INDEX])
@@ -188,7 +188,7 @@ def find_on_path(x, path, memory):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def steer_along(x, u, p, driver, path, memory):  # type: ignore[no-untyped-def]
+def steer_along(x, u, p, driver, path, memory):
     """Return the steering angle that the path driver wants [rad]."""
     v_x = max(x[plant.V_X], 1.0)
     speed = math.hypot(v_x, x[plant.V_Y])
@@ -218,7 +218,7 @@ def steer_along(x, u, p, driver, path, memory):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def command(time, x, u, p, driver, planned, path, memory, action):  # type: ignore[no-untyped-def]
+def command(time, x, u, p, driver, planned, path, memory, action):
     """Write the driver's next action: the steering angle to reach and four wheel torques.
 
     Parameters

@@ -63,7 +63,7 @@ def breakpoints(segments: tuple[Segment, ...]) -> set[float]:
 
 
 @inlined
-def _piece_value(time, piece):  # type: ignore[no-untyped-def]
+def _piece_value(time, piece):
     share = (time - piece.start) / (piece.end - piece.start)
     value = piece.first + (piece.last - piece.first) * share
     if piece.amplitude != 0.0:
@@ -72,7 +72,7 @@ def _piece_value(time, piece):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def profile_value(time, segments):  # type: ignore[no-untyped-def]
+def profile_value(time, segments):
     """Return the value of a profile; at a jump, the value after it."""
     value = 0.0
     for i in range(segments.shape[0]):
@@ -83,7 +83,7 @@ def profile_value(time, segments):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def profile_values(times, segments):  # type: ignore[no-untyped-def]
+def profile_values(times, segments):
     """Return the values of a profile at ascending times, the bytes of `profile_value`."""
     values = np.zeros(times.shape[0])
     for i in range(segments.shape[0]):

@@ -240,7 +240,7 @@ _CLOCK = np.dtype([("late", np.int64), ("filled", np.int64)])
 
 
 @compiled
-def _alter(op, state, events, time, value, inside):  # type: ignore[no-untyped-def]
+def _alter(op, state, events, time, value, inside):
     """Return a fresh reading as the fault leaves it, and whether it arrives."""
     if op.code == SPIKE:
         while state.cursor < op.end and events[state.cursor].start <= time:
@@ -266,7 +266,7 @@ def _alter(op, state, events, time, value, inside):  # type: ignore[no-untyped-d
 
 
 @compiled
-def _act(k, row, window, ops, states, events, ring):  # type: ignore[no-untyped-def]
+def _act(k, row, window, ops, states, events, ring):
     time = row[0]
     inside = window[0] <= time < window[1]
     for j in range(ops.shape[0]):
@@ -298,7 +298,7 @@ def _act(k, row, window, ops, states, events, ring):  # type: ignore[no-untyped-
 
 
 @compiled
-def _apply(first, rows, window, ops, states, events, ring, jitter, swaps, clock, kept):  # type: ignore[no-untyped-def]
+def _apply(first, rows, window, ops, states, events, ring, jitter, swaps, clock, kept):
     for i in range(rows.shape[0]):
         row = rows[i]
         time = row[0]

@@ -148,7 +148,7 @@ _STATE = np.dtype(
 
 
 @compiled
-def _count_teeth(time, elapsed, speed, new, spec, state):  # type: ignore[no-untyped-def]
+def _count_teeth(time, elapsed, speed, new, spec, state):
     """Return the wheel speed [rad/s] that the times of the teeth give.
 
     Where no tooth has passed since the last reading, the wheel turns no faster than the time since
@@ -175,7 +175,7 @@ def _count_teeth(time, elapsed, speed, new, spec, state):  # type: ignore[no-unt
 
 
 @compiled
-def _measure(k, truth, specs, states, history, noise, walk, out):  # type: ignore[no-untyped-def]
+def _measure(k, truth, specs, states, history, noise, walk, out):
     """Measure sample `k`: all arguments are rows of this sample, `history` a ring of the past."""
     time = truth[0]
     out[0] = time
@@ -226,7 +226,7 @@ def _measure(k, truth, specs, states, history, noise, walk, out):  # type: ignor
 
 
 @compiled
-def _measure_block(first, truth, specs, states, history, noise, walk, out):  # type: ignore[no-untyped-def]
+def _measure_block(first, truth, specs, states, history, noise, walk, out):
     for i in range(truth.shape[0]):
         _measure(first + i, truth[i], specs, states, history, noise[i], walk[i], out[i])
 
@@ -416,7 +416,7 @@ _LANE_ARRAYS = ("_specs", "_states", "_history", "_noise", "_walk")
 
 
 @compiled
-def _measure_lanes(lanes, samples, truth, specs, states, history, noise, walk, out):  # type: ignore[no-untyped-def]
+def _measure_lanes(lanes, samples, truth, specs, states, history, noise, walk, out):
     for lane in lanes:
         k = samples[lane]
         at = k % noise.shape[1]

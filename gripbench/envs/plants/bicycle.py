@@ -130,7 +130,7 @@ class BicycleScenario(DrivenScenario):
 
 
 @compiled
-def derivative(x, u, p, dx):  # type: ignore[no-untyped-def]
+def derivative(x, u, p, dx):
     """Fill `dx` with the time derivative of the state; return the axles' forces [N].
 
     State, inputs and parameters have the layout of `gripbench.envs.plants.planar.plant`.
@@ -154,7 +154,7 @@ def derivative(x, u, p, dx):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _feel_bank(run):  # type: ignore[no-untyped-def]
+def _feel_bank(run):
     place = min(max(run.state[plant.DISTANCE] / ROAD_SPACING, 0.0), run.profile.shape[0] - 2.000001)
     first = int(place)
     bank = run.profile[first, 0]
@@ -164,7 +164,7 @@ def _feel_bank(run):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _write(run, k, truth, at):  # type: ignore[no-untyped-def]
+def _write(run, k, truth, at):
     x, p, row = run.state, run.plant[0], truth[at]
     front, rear = derivative(x, run.inputs, p, run.work[0])
     heading = run.site[HEADING]
@@ -192,7 +192,7 @@ def _write(run, k, truth, at):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def begin(run, speed, truth):  # type: ignore[no-untyped-def]
+def begin(run, speed, truth):
     """Put the vehicle at the origin of the track at a speed [m/s]; write the first sample."""
     run.state[plant.V_X] = speed
     run.inputs[plant.NORMAL] = GRAVITY
@@ -202,7 +202,7 @@ def begin(run, speed, truth):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def decide(run, k):  # type: ignore[no-untyped-def]
+def decide(run, k):
     """Write the driver's steering from sample `k` to the next into the run."""
     planned = run.planned[min(k + 1, run.planned.shape[0] - 1)]
     command(
@@ -212,7 +212,7 @@ def decide(run, k):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def act(run, k, parts, steer, truth, at):  # type: ignore[no-untyped-def]
+def act(run, k, parts, steer, truth, at):
     """Steer to an angle [rad] up to sample `k`, write that into row `at`; return a code."""
     x, u, p = run.state, run.inputs, run.plant[0]
     wanted = min(max(steer, -p.steer_limit), p.steer_limit)
@@ -245,7 +245,7 @@ def act(run, k, parts, steer, truth, at):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def roll_out(run, parts, truth):  # type: ignore[no-untyped-def]
+def roll_out(run, parts, truth):
     """Run from the first sample to the end; return the number of samples and a code."""
     for k in range(1, truth.shape[0]):
         decide(run, k - 1)

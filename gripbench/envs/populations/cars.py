@@ -93,7 +93,7 @@ def _ratio(car: Mapping[str, float], paper: Mapping[str, float], name: str) -> f
     return car[name] / paper[name] if name in paper else 1.0
 
 
-def _load(car: dict[str, float], d) -> None:  # type: ignore[no-untyped-def]
+def _load(car: dict[str, float], d) -> None:
     """Put the payload into the car: mass, centre of gravity, inertia and height move together."""
     if "mass" not in car:
         return
@@ -119,7 +119,7 @@ def _load(car: dict[str, float], d) -> None:  # type: ignore[no-untyped-def]
         car["cg_height"] += load / mass * d("car.payload_height")
 
 
-def _tyres(car, paper, d, effects) -> CarOnRoad:  # type: ignore[no-untyped-def]
+def _tyres(car, paper, d, effects) -> CarOnRoad:
     """Return the car with the tyres that wear, pressure and temperature make."""
     warmer = d("tyre.temperature")
     radii, peaks, stiffness = {}, {}, {}

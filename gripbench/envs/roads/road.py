@@ -232,7 +232,7 @@ def disturb_field(
 
 
 @compiled
-def feel_road(x, p, friction, profile, u):  # type: ignore[no-untyped-def]
+def feel_road(x, p, friction, profile, u):
     """Write the inputs `u` that the place on the road gives the state `x`: gravity, friction."""
     place = min(max(x[plant.DISTANCE] / SPACING, 0.0), profile.shape[0] - 2.000001)
     first = int(place)

@@ -12,7 +12,7 @@ _SLIDING = 3.0
 
 
 @inlined
-def secant(s):  # type: ignore[no-untyped-def]
+def secant(s):
     """Return f(s) / s for s >= 0."""
     if s < _SLIDING:
         return 1.0 - s / 3.0 + s * s / 27.0
@@ -20,6 +20,6 @@ def secant(s):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def tangent(s):  # type: ignore[no-untyped-def]
+def tangent(s):
     """Return f'(s) for s >= 0."""
     return (1.0 - s / _SLIDING) ** 2 if s < _SLIDING else 0.0

@@ -31,7 +31,7 @@ SHAPES: dict[str, int] = {
 
 
 @compiled
-def secant(shape, s):  # type: ignore[no-untyped-def]
+def secant(shape, s):
     """Return f(s) / s, the secant slope of a shape at the normalised slip s >= 0; 1 at s = 0.
 
     Parameters
@@ -51,7 +51,7 @@ def secant(shape, s):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def tangent(shape, s):  # type: ignore[no-untyped-def]
+def tangent(shape, s):
     """Return f'(s), the slope of a shape at the normalised slip s >= 0; arguments as `secant`."""
     if shape == BRUSH:
         return brush.tangent(s)
@@ -63,7 +63,7 @@ def tangent(shape, s):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def combined_force(shape, slip_x, slip_y, stiffness_x, stiffness_y, capacity):  # type: ignore[no-untyped-def]
+def combined_force(shape, slip_x, slip_y, stiffness_x, stiffness_y, capacity):
     """Return the tyre force (F_x, F_y) [N] in the axes of the wheel.
 
     Parameters

@@ -10,7 +10,7 @@ from gripbench.compilation import inlined
 
 
 @inlined
-def secant(s):  # type: ignore[no-untyped-def]
+def secant(s):
     """Return f(s) / s for s >= 0."""
     if s < 0.5:
         return 1.0
@@ -18,6 +18,6 @@ def secant(s):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def tangent(s):  # type: ignore[no-untyped-def]
+def tangent(s):
     """Return f'(s) for s >= 0."""
     return 1.0 if s < 0.5 else 0.25 / (s * s)

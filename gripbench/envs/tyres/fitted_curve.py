@@ -21,7 +21,7 @@ _LOCKED_FORCE = (_C1 * (1.0 - math.exp(-_C2)) - _C3) / _PEAK
 
 
 @inlined
-def secant(s):  # type: ignore[no-untyped-def]
+def secant(s):
     """Return f(s) / s for s >= 0."""
     if s < 1e-6:
         return 1.0
@@ -32,7 +32,7 @@ def secant(s):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def tangent(s):  # type: ignore[no-untyped-def]
+def tangent(s):
     """Return f'(s) for s >= 0."""
     if s >= _LOCKED:
         return 0.0

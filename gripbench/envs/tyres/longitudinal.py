@@ -16,7 +16,7 @@ CRAWL_SPEED = 0.1
 
 
 @inlined
-def slip_ratio(rolling_speed, speed):  # type: ignore[no-untyped-def]
+def slip_ratio(rolling_speed, speed):
     """Return the slip ratio of eq. 5, in one form for traction and braking.
 
     Parameters
@@ -34,7 +34,7 @@ def slip_ratio(rolling_speed, speed):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def slip_ratio_slopes(rolling_speed, speed):  # type: ignore[no-untyped-def]
+def slip_ratio_slopes(rolling_speed, speed):
     """Return the derivatives of `slip_ratio` to the rolling speed and to the speed [s/m]."""
     rolling, moving = abs(rolling_speed), abs(speed)
     difference = rolling_speed - speed
@@ -48,7 +48,7 @@ def slip_ratio_slopes(rolling_speed, speed):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def magic_formula(slip, stiffness, shape, curvature):  # type: ignore[no-untyped-def]
+def magic_formula(slip, stiffness, shape, curvature):
     """Return the tyre force of eq. 4 over its peak value D = mu F_z.
 
     Parameters
@@ -63,7 +63,7 @@ def magic_formula(slip, stiffness, shape, curvature):  # type: ignore[no-untyped
 
 
 @inlined
-def magic_formula_slope(slip, stiffness, shape, curvature):  # type: ignore[no-untyped-def]
+def magic_formula_slope(slip, stiffness, shape, curvature):
     """Return the value of `magic_formula` and its derivative to the slip ratio."""
     stretched = stiffness * slip
     inner = stretched - curvature * (stretched - atan(stretched))

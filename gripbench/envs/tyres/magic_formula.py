@@ -14,7 +14,7 @@ MAGIC_SHAPE = 1.3
 
 
 @inlined
-def secant(s):  # type: ignore[no-untyped-def]
+def secant(s):
     """Return f(s) / s for s >= 0."""
     if s < 1e-6:
         return 1.0
@@ -22,7 +22,7 @@ def secant(s):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def tangent(s):  # type: ignore[no-untyped-def]
+def tangent(s):
     """Return f'(s) for s >= 0."""
     inner = s / MAGIC_SHAPE
     return math.cos(MAGIC_SHAPE * math.atan(inner)) / (1.0 + inner * inner)

@@ -20,7 +20,7 @@ _WHEELS = ("wheel_speed_rear_left", "wheel_speed_rear_right")
 
 
 @compiled
-def steady_sideslip(speed, yaw_rate, params):  # type: ignore[no-untyped-def]
+def steady_sideslip(speed, yaw_rate, params):
     """Return the sideslip angle [rad] of a steady turn at a speed [m/s] and yaw rate [rad/s]."""
     wheelbase = params.cg_to_front + params.cg_to_rear
     load = params.cg_to_front * params.mass * speed / (wheelbase * params.cornering_stiffness_rear)
@@ -28,7 +28,7 @@ def steady_sideslip(speed, yaw_rate, params):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def steady_yaw_rate(speed, steer, params):  # type: ignore[no-untyped-def]
+def steady_yaw_rate(speed, steer, params):
     """Return the yaw rate [rad/s] of a steady turn at a speed [m/s] and steering angle [rad]."""
     a, b = params.cg_to_front, params.cg_to_rear
     front, rear = params.cornering_stiffness_front, params.cornering_stiffness_rear
@@ -38,7 +38,7 @@ def steady_yaw_rate(speed, steer, params):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _write(state, speed, yaw_rate, params, est):  # type: ignore[no-untyped-def]
+def _write(state, speed, yaw_rate, params, est):
     if speed == speed and yaw_rate == yaw_rate:  # what is missing stays as it was
         state.sideslip = 0.0
         if speed > params.lowest_speed:
@@ -47,28 +47,28 @@ def _write(state, speed, yaw_rate, params, est):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _rolling(obs, params):  # type: ignore[no-untyped-def]
+def _rolling(obs, params):
     return 0.5 * params.wheel_radius * (obs.wheel_speed_rear_left + obs.wheel_speed_rear_right)
 
 
 @compiled
-def _step(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step(state, obs, params, est):
     _write(state, _rolling(obs, params), obs.yaw_rate, params, est)
 
 
 @compiled
-def _step_steering(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step_steering(state, obs, params, est):
     speed = _rolling(obs, params)
     _write(state, speed, steady_yaw_rate(speed, obs.steer_angle, params), params, est)
 
 
 @compiled
-def _step_measured(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step_measured(state, obs, params, est):
     _write(state, obs.speed_x, obs.yaw_rate, params, est)
 
 
 @compiled
-def _step_gps(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step_gps(state, obs, params, est):
     _write(state, obs.speed_gps, obs.yaw_rate, params, est)
 
 

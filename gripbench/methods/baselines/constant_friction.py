@@ -13,18 +13,18 @@ from gripbench.methods.contract import CompiledMethod, Parameter, Variant, compi
 
 
 @compiled
-def _write(est, mu, variance):  # type: ignore[no-untyped-def]
+def _write(est, mu, variance):
     est.mu, est.mu_front, est.mu_rear = mu, mu, mu
     est.mu_variance, est.mu_front_variance, est.mu_rear_variance = variance, variance, variance
 
 
 @compiled
-def _step(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step(state, obs, params, est):
     _write(est, params.friction, params.friction_std**2)
 
 
 @compiled
-def _step_prior(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step_prior(state, obs, params, est):
     _write(est, params.friction_prior, params.friction_prior_std**2)
 
 

@@ -13,14 +13,14 @@ from gripbench.methods.contract import CompiledMethod, Variant, compiled
 
 
 @compiled
-def _step(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step(state, obs, params, est):
     if obs.course == obs.course:
         state.yaw = obs.course
     est.yaw = state.yaw
 
 
 @compiled
-def _step_gyroscope(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step_gyroscope(state, obs, params, est):
     if state.located == 0.0 and obs.course == obs.course:
         state.located, state.yaw = 1.0, obs.course
     else:

@@ -8,7 +8,7 @@ from gripbench.methods.contract import CompiledMethod, compiled
 
 
 @compiled
-def _step(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step(state, obs, params, est):
     if obs.accel_x == obs.accel_x:
         state.accel_x = obs.accel_x
     force = params.mass * state.accel_x / (params.cg_to_front + params.cg_to_rear)

@@ -16,7 +16,7 @@ _NAMES = ("speed", "rate", "speed_y")
 
 
 @compiled
-def _advance(state, speed, obs, params, est):  # type: ignore[no-untyped-def]
+def _advance(state, speed, obs, params, est):
     kept = exp(-obs.elapsed / params.forgetting_time)
     state.speed_y = kept * state.speed_y + (1.0 - kept) * params.forgetting_time * state.rate
     if speed == speed:  # what is missing stays as it was
@@ -29,18 +29,18 @@ def _advance(state, speed, obs, params, est):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _step(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step(state, obs, params, est):
     rolling = 0.5 * (obs.wheel_speed_rear_left + obs.wheel_speed_rear_right)
     _advance(state, params.wheel_radius * rolling, obs, params, est)
 
 
 @compiled
-def _step_measured(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step_measured(state, obs, params, est):
     _advance(state, obs.speed_x, obs, params, est)
 
 
 @compiled
-def _step_gps(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step_gps(state, obs, params, est):
     _advance(state, obs.speed_gps, obs, params, est)
 
 

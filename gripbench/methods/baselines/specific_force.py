@@ -15,7 +15,7 @@ from gripbench.methods.contract import CompiledMethod, Parameter, Variant, compi
 
 
 @compiled
-def _advance(state, accel_x, accel_y, obs, params, est):  # type: ignore[no-untyped-def]
+def _advance(state, accel_x, accel_y, obs, params, est):
     share = -expm1(-obs.elapsed / params.smoothing_time)
     if accel_x == accel_x:  # a missing sample changes nothing
         state.accel_x += share * (accel_x - state.accel_x)
@@ -28,17 +28,17 @@ def _advance(state, accel_x, accel_y, obs, params, est):  # type: ignore[no-unty
 
 
 @compiled
-def _step(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step(state, obs, params, est):
     _advance(state, obs.accel_x, obs.accel_y, obs, params, est)
 
 
 @compiled
-def _step_longitudinal(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step_longitudinal(state, obs, params, est):
     _advance(state, obs.accel_x, 0.0, obs, params, est)
 
 
 @compiled
-def _step_lateral(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step_lateral(state, obs, params, est):
     _advance(state, 0.0, obs.accel_y, obs, params, est)
 
 

@@ -8,7 +8,7 @@ from gripbench.methods.contract import CompiledMethod, Parameter, compiled
 
 
 @compiled
-def _step(state, obs, params, est):  # type: ignore[no-untyped-def]
+def _step(state, obs, params, est):
     est.sideslip, est.speed_y = 0.0, 0.0
     est.sideslip_variance = params.sideslip_std**2
 

@@ -62,21 +62,21 @@ AXLE_FRICTION_VEHICLE = (*AXLE_LOAD_PARAMETERS, *TYRE_PARAMETERS)
 
 
 @inlined
-def front_load(params):  # type: ignore[no-untyped-def]
+def front_load(params):
     """Return the static load of the front axle [N], eq. 6a."""
     wheelbase = params.cg_to_front + params.cg_to_rear
     return params.mass * GRAVITY * params.cg_to_rear / wheelbase
 
 
 @inlined
-def rear_load(params):  # type: ignore[no-untyped-def]
+def rear_load(params):
     """Return the static load of the rear axle [N], eq. 6b."""
     wheelbase = params.cg_to_front + params.cg_to_rear
     return params.mass * GRAVITY * params.cg_to_front / wheelbase
 
 
 @inlined
-def total_force(accel_x, speed, params):  # type: ignore[no-untyped-def]
+def total_force(accel_x, speed, params):
     """Return the sum of the tyre forces [N], eq. 8.
 
     Erratum: `accel_x` is the accelerometer's reading, the rate of change of speed less gravity's
@@ -90,7 +90,7 @@ def total_force(accel_x, speed, params):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def rls(theta, covariance, regressor, output, forgetting):  # type: ignore[no-untyped-def]
+def rls(theta, covariance, regressor, output, forgetting):
     """Return the parameter and its covariance after one sample, eq. 11-14.
 
     Parameters
@@ -111,7 +111,7 @@ def rls(theta, covariance, regressor, output, forgetting):  # type: ignore[no-un
 
 
 @inlined
-def forgetting_factor(params, elapsed):  # type: ignore[no-untyped-def]
+def forgetting_factor(params, elapsed):
     """Return lambda for a sample that comes `elapsed` seconds after the last."""
     if params.memory_time > 0.0:
         return exp(-elapsed / params.memory_time)
@@ -119,7 +119,7 @@ def forgetting_factor(params, elapsed):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def slip_regressor(slip, params):  # type: ignore[no-untyped-def]
+def slip_regressor(slip, params):
     """Return what the normalised force is proportional to: the slip, or the tyre's shape."""
     if params.tyre_shape > 0.5:
         return magic_formula(slip, params.magic_b, params.magic_c, params.magic_e)
@@ -127,7 +127,7 @@ def slip_regressor(slip, params):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def friction_of_slope(slope, params):  # type: ignore[no-untyped-def]
+def friction_of_slope(slope, params):
     """Return the friction coefficient of a slip slope, eq. 15."""
     gain = params.slope_gain
     if gain == 0.0:
@@ -136,13 +136,13 @@ def friction_of_slope(slope, params):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def excited(force, params):  # type: ignore[no-untyped-def]
+def excited(force, params):
     """Return whether the force of an axle [N] is large enough to tell the friction."""
     return abs(force) >= params.excitation_force
 
 
 @inlined
-def axle_friction(slope, covariance, force, slip, load, elapsed, params):  # type: ignore[no-untyped-def]
+def axle_friction(slope, covariance, force, slip, load, elapsed, params):
     """Return slip slope, covariance and friction of an axle after one sample.
 
     Parameters
@@ -164,14 +164,14 @@ def axle_friction(slope, covariance, force, slip, load, elapsed, params):  # typ
 
 
 @inlined
-def axle_slips(wheel_speed_front, wheel_speed_rear, speed, params):  # type: ignore[no-untyped-def]
+def axle_slips(wheel_speed_front, wheel_speed_rear, speed, params):
     """Return the slip ratios of both axles, eq. 5, for wheel speeds [rad/s] and a speed [m/s]."""
     front = slip_ratio(params.wheel_radius * wheel_speed_front, speed)
     return front, slip_ratio(params.wheel_radius * wheel_speed_rear, speed)
 
 
 @inlined
-def estimate_friction(state, est, slip_front, slip_rear, elapsed, params):  # type: ignore[no-untyped-def]
+def estimate_friction(state, est, slip_front, slip_rear, elapsed, params):
     """Write the friction of both axles from the forces that `est` holds already.
 
     `state` keeps the fields of `AXLE_FRICTION_STATE`.
@@ -197,7 +197,7 @@ def estimate_friction(state, est, slip_front, slip_rear, elapsed, params):  # ty
 
 
 @inlined
-def start_friction(state, params):  # type: ignore[no-untyped-def]
+def start_friction(state, params):
     """Set the first covariances of both axles."""
     state.covariance_front = params.covariance
     state.covariance_rear = params.covariance

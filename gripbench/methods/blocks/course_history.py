@@ -30,13 +30,13 @@ HISTORY = np.dtype(
 
 
 @compiled
-def wrapped(angle):  # type: ignore[no-untyped-def]
+def wrapped(angle):
     """Return an angle within -pi to pi."""
     return angle - 2.0 * pi * np.floor((angle + pi) / (2.0 * pi))
 
 
 @compiled
-def remember(history, time, value):  # type: ignore[no-untyped-def]
+def remember(history, time, value):
     """Add the predicted course (unwrapped) at a time; times must not decrease."""
     count = int(history.count)
     if count > 1 and time - history.times[(count - 2) % _LENGTH] < _SPACING:
@@ -47,7 +47,7 @@ def remember(history, time, value):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def is_usable(history, sample_time):  # type: ignore[no-untyped-def]
+def is_usable(history, sample_time):
     """Return whether a sample is newer than all before and within the history; note its time."""
     count = int(history.count)
     if count == 0:
@@ -66,7 +66,7 @@ def is_usable(history, sample_time):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def change_since(history, sample_time):  # type: ignore[no-untyped-def]
+def change_since(history, sample_time):
     """Return the predicted change of course since a time within the history."""
     newest = int(history.count) - 1
     first = max(0, newest + 1 - _LENGTH)

@@ -12,7 +12,7 @@ _TERMS = 10  # of the series; exact to rounding for a norm below 1/8
 
 
 @compiled
-def exponential(M, E, work):  # type: ignore[no-untyped-def]
+def exponential(M, E, work):
     """Fill `E` with exp(M): series of a halved matrix, squared back; `M` is overwritten.
 
     Parameters

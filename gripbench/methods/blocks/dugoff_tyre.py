@@ -15,7 +15,7 @@ from gripbench.compilation import compiled
 
 
 @compiled
-def dugoff_slips(rolling, speed, lateral, printed):  # type: ignore[no-untyped-def]
+def dugoff_slips(rolling, speed, lateral, printed):
     """Return lambda/(1 - |lambda|), tan(alpha)/(1 - |lambda|) and their slopes.
 
     Parameters
@@ -54,7 +54,7 @@ def dugoff_slips(rolling, speed, lateral, printed):  # type: ignore[no-untyped-d
 
 
 @compiled
-def dugoff_force(linear_x, linear_y, capacity):  # type: ignore[no-untyped-def]
+def dugoff_force(linear_x, linear_y, capacity):
     """Return F_x, F_y [N] and the slopes dF_x/dg_x, dF_x/dg_y (= dF_y/dg_x), dF_y/dg_y.
 
     Parameters

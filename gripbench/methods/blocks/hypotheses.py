@@ -36,7 +36,7 @@ def bank_type(hypotheses: int, states: int) -> np.dtype:
 
 
 @compiled
-def mix(bank, leaving):  # type: ignore[no-untyped-def]
+def mix(bank, leaving):
     """Start a step: predicted weights, and for each hypothesis the mixture that leads to it.
 
     Parameters
@@ -80,7 +80,7 @@ def mix(bank, leaving):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def take(bank, j, filter):  # type: ignore[no-untyped-def]
+def take(bank, j, filter):
     """Copy what hypothesis `j` starts from into a filter."""
     n = filter.x.shape[0]
     for a in range(n):
@@ -90,7 +90,7 @@ def take(bank, j, filter):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def put(bank, j, filter):  # type: ignore[no-untyped-def]
+def put(bank, j, filter):
     """Copy a filter back as hypothesis `j`."""
     n = filter.x.shape[0]
     for a in range(n):
@@ -100,7 +100,7 @@ def put(bank, j, filter):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def score_of(distance, variance):  # type: ignore[no-untyped-def]
+def score_of(distance, variance):
     """Return the logarithm of a Gaussian likelihood, less its constant.
 
     Parameters
@@ -114,7 +114,7 @@ def score_of(distance, variance):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def weigh(bank):  # type: ignore[no-untyped-def]
+def weigh(bank):
     """End a step: weights by the likelihoods in `score`."""
     k = bank.weight.shape[0]
     best = -np.inf
@@ -131,7 +131,7 @@ def weigh(bank):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def moments(bank, a):  # type: ignore[no-untyped-def]
+def moments(bank, a):
     """Return mean and variance of state `a` over the mixture."""
     mean, square = 0.0, 0.0
     for j in range(bank.weight.shape[0]):

@@ -69,7 +69,7 @@ def filter_type(states: int, outputs: int = 0) -> np.dtype[Any]:
 
 
 @compiled
-def predict_covariance(filter):  # type: ignore[no-untyped-def]
+def predict_covariance(filter):
     """Advance the covariance by one step, P = F P F' + Q; an EKF advances `x` itself."""
     n = filter.x.shape[0]
     P, F, Q, W = filter.P, filter.F, filter.Q, filter.work
@@ -89,7 +89,7 @@ def predict_covariance(filter):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def predict(filter):  # type: ignore[no-untyped-def]
+def predict(filter):
     """Advance mean and covariance by one step, x = F x; inputs are the caller's to add."""
     n = filter.x.shape[0]
     x, F, W = filter.x, filter.F, filter.work
@@ -104,7 +104,7 @@ def predict(filter):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def correct_scalar(filter, residual, variance):  # type: ignore[no-untyped-def]
+def correct_scalar(filter, residual, variance):
     """Take one measurement with row `h`; return its normalised innovation squared.
 
     `residual` is measurement less prediction, `variance` that of the measurement. A measurement
@@ -141,7 +141,7 @@ def correct_scalar(filter, residual, variance):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def innovation_distance(filter):  # type: ignore[no-untyped-def]
+def innovation_distance(filter):
     """Return d^2 = residual' S^-1 residual of the measurements with `H`, `R` and `residual`.
 
     Prepares `correct`. Returns inf if S = H P H' + R is not positive definite; such measurements
@@ -186,7 +186,7 @@ def innovation_distance(filter):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def correct(filter):  # type: ignore[no-untyped-def]
+def correct(filter):
     """Take the measurements for which `innovation_distance` was called last."""
     n = filter.x.shape[0]
     m = filter.residual.shape[0]

@@ -32,7 +32,7 @@ LOWEST_SPEED = 3.0
 
 
 @compiled
-def brush_axle(angle, stiffness, limit):  # type: ignore[no-untyped-def]
+def brush_axle(angle, stiffness, limit):
     """Return the force of an axle [N] and its slopes to slip angle [N/rad] and to `limit`.
 
     Parameters
@@ -56,7 +56,7 @@ def brush_axle(angle, stiffness, limit):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def axle_loads(accel_x, params):  # type: ignore[no-untyped-def]
+def axle_loads(accel_x, params):
     """Return the loads of front and rear axle [N] at a longitudinal specific force [m/s^2].
 
     `params` holds `mass`, `cg_to_front`, `cg_to_rear` and `cg_height`.
@@ -70,14 +70,14 @@ def axle_loads(accel_x, params):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def static_loads(params):  # type: ignore[no-untyped-def]
+def static_loads(params):
     """Return the static loads of front and rear axle [N]."""
     weight = params.mass * GRAVITY / (params.cg_to_front + params.cg_to_rear)
     return weight * params.cg_to_rear, weight * params.cg_to_front
 
 
 @compiled
-def slip_angles(speed, speed_y, yaw_rate, steer, params):  # type: ignore[no-untyped-def]
+def slip_angles(speed, speed_y, yaw_rate, steer, params):
     """Return both slip angles [rad] and their slopes to v_y [s/m], which are negative."""
     forward = max(speed, LOWEST_SPEED)
     front_y = speed_y + params.cg_to_front * yaw_rate
@@ -90,7 +90,7 @@ def slip_angles(speed, speed_y, yaw_rate, steer, params):  # type: ignore[no-unt
 
 
 @compiled
-def motion(speed, x, steer, front, rear, limit_front, limit_rear, params, out):  # type: ignore[no-untyped-def]
+def motion(speed, x, steer, front, rear, limit_front, limit_rear, params, out):
     """Fill `out`, shape (2, 7), with specific force and yaw acceleration and their slopes.
 
     Parameters

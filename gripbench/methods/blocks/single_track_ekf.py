@@ -16,7 +16,7 @@ _LEAST, _LARGEST = log(0.05), log(1.4)
 
 
 @compiled
-def evaluate_track(x, speed, steer, friction, params, out):  # type: ignore[no-untyped-def]
+def evaluate_track(x, speed, steer, friction, params, out):
     """Fill `out`, shape (2, 7), as `motion` does; `friction` is used where mu is no state."""
     n = x.shape[0]
     mu = exp(x[n - 1]) if n > 2 else friction
@@ -28,7 +28,7 @@ def evaluate_track(x, speed, steer, friction, params, out):  # type: ignore[no-u
 
 
 @compiled
-def _slope(out, row, k, n):  # type: ignore[no-untyped-def]
+def _slope(out, row, k, n):
     """Return the slope of a row of `out` to state `k` of `n`."""
     if k < 2:
         return out[row, 1 + k]
@@ -38,7 +38,7 @@ def _slope(out, row, k, n):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def predict_track(filter, span, speed, steer, friction, params, out):  # type: ignore[no-untyped-def]
+def predict_track(filter, span, speed, steer, friction, params, out):
     """Advance by `span` [s]; the caller has set what of Q belongs to states behind the second."""
     x, F, Q = filter.x, filter.F, filter.Q
     n = x.shape[0]
@@ -58,7 +58,7 @@ def predict_track(filter, span, speed, steer, friction, params, out):  # type: i
 
 
 @compiled
-def correct_track(filter, span, speed, steer, friction, yaw_rate, accel_y, params, out):  # type: ignore[no-untyped-def]
+def correct_track(filter, span, speed, steer, friction, yaw_rate, accel_y, params, out):
     """Take yaw rate and a_y; return their innovations squared over variance, and the variances."""
     x, h, P = filter.x, filter.h, filter.P
     n = x.shape[0]

@@ -63,26 +63,26 @@ ADAPTIVE_PARAMETERS = (
 
 
 @compiled
-def read_fused(inputs, obs, params):  # type: ignore[no-untyped-def]
+def read_fused(inputs, obs, params):
     """Read the inputs of a sample; the speed is fused from production sensors."""
     advance_speed(inputs.fusion, obs, params, inputs.speed_y)
     _read(inputs, inputs.fusion.filter.x[0], obs)
 
 
 @compiled
-def read_measured(inputs, obs, params):  # type: ignore[no-untyped-def]
+def read_measured(inputs, obs, params):
     """Read the inputs of a sample; the speed is the channel `speed_x`."""
     _read(inputs, obs.speed_x, obs)
 
 
 @compiled
-def read_gps(inputs, obs, params):  # type: ignore[no-untyped-def]
+def read_gps(inputs, obs, params):
     """Read the inputs of a sample; the speed is the channel `speed_gps`."""
     _read(inputs, obs.speed_gps, obs)
 
 
 @compiled
-def _read(inputs, speed, obs):  # type: ignore[no-untyped-def]
+def _read(inputs, speed, obs):
     if speed == speed:
         inputs.speed = max(speed, LOWEST_SPEED)
     elif inputs.speed < LOWEST_SPEED:
@@ -95,7 +95,7 @@ def _read(inputs, speed, obs):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def write_lateral(inputs, speed_y, yaw_rate, variance, est):  # type: ignore[no-untyped-def]
+def write_lateral(inputs, speed_y, yaw_rate, variance, est):
     """Write the estimates of a single-track filter; `variance` is that of v_y [m^2/s^2]."""
     inputs.speed_y = speed_y
     forward = inputs.speed
@@ -112,7 +112,7 @@ LATERAL_VARIANCES = ("sideslip", "speed_y")
 
 
 @compiled
-def start_adaptive(x, P, first, params):  # type: ignore[no-untyped-def]
+def start_adaptive(x, P, first, params):
     """Set ln C_f, ln C_r and ln mu, from state `first` on."""
     x[first + 2] = log(params.friction_mean)
     P[first, first] = P[first + 1, first + 1] = params.stiffness_std**2
@@ -120,7 +120,7 @@ def start_adaptive(x, P, first, params):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def write_friction(logarithm, variance, est):  # type: ignore[no-untyped-def]
+def write_friction(logarithm, variance, est):
     """Write mean and variance of the friction from those of its logarithm (log-normal)."""
     spread = min(variance, 1.0)
     est.mu = exp(min(logarithm + 0.5 * spread, 0.5))

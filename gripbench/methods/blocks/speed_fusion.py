@@ -73,7 +73,7 @@ SPEED_STATE = np.dtype(
 
 
 @compiled
-def _wheel(state, wheel_speed, front, side, speed_y, elapsed, params):  # type: ignore[no-untyped-def]
+def _wheel(state, wheel_speed, front, side, speed_y, elapsed, params):
     """Take one wheel; `side` is +1 left and -1 right."""
     filter = state.filter
     accel = state.accel_x - filter.x[1]
@@ -102,7 +102,7 @@ def _wheel(state, wheel_speed, front, side, speed_y, elapsed, params):  # type: 
 
 
 @compiled
-def advance_speed(state, obs, params, speed_y):  # type: ignore[no-untyped-def]
+def advance_speed(state, obs, params, speed_y):
     """Take one sample.
 
     Parameters

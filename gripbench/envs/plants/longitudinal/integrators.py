@@ -47,7 +47,7 @@ _E1, _E2, _E3 = 0.5, -2.9079558716805469821718236208017, 0.223540698978115696273
 
 
 @inlined
-def _solve_arrow(b0, b1, b2, arrow):  # type: ignore[no-untyped-def]
+def _solve_arrow(b0, b1, b2, arrow):
     """Return the solution k of (shift I - J) k = b for the arrow matrix J, axles eliminated."""
     to_front, to_rear, j10, j20, inverse, front, rear = arrow
     k0 = (b0 + to_front * b1 + to_rear * b2) * inverse
@@ -55,7 +55,7 @@ def _solve_arrow(b0, b1, b2, arrow):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def ros3(x, step, duration, inputs, plant, tyres):  # type: ignore[no-untyped-def]
+def ros3(x, step, duration, inputs, plant, tyres):
     """Advance the state by `duration`; return the step size to try next.
 
     The three components stand as scalars, which compiles to half the time of arrays.
@@ -128,7 +128,7 @@ def ros3(x, step, duration, inputs, plant, tyres):  # type: ignore[no-untyped-de
 
 
 @compiled
-def rk4(x, duration, inputs, plant, work):  # type: ignore[no-untyped-def]
+def rk4(x, duration, inputs, plant, work):
     """Advance the state by `duration` in ten equal steps.
 
     Arguments as for `ros3`; `work` is scratch, shape (5, 3).
@@ -151,7 +151,7 @@ def rk4(x, duration, inputs, plant, work):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def integrate(x, step, duration, inputs, plant, integrator, tyres, work):  # type: ignore[no-untyped-def]
+def integrate(x, step, duration, inputs, plant, integrator, tyres, work):
     """Advance the state by `duration` with a named integrator; return the next step size."""
     if integrator == RK4:
         rk4(x, duration, inputs, plant, work)

@@ -133,7 +133,7 @@ class LongitudinalLanes(Lanes):
 
 
 @compiled
-def _drive_lanes(k, sample_time, x, front, rear, slip_limits, plants, torques):  # type: ignore[no-untyped-def]
+def _drive_lanes(k, sample_time, x, front, rear, slip_limits, plants, torques):
     for lane in range(k.shape[0]):
         decide(
             k[lane], sample_time, x[lane], front[lane], rear[lane], slip_limits[lane],
@@ -142,7 +142,7 @@ def _drive_lanes(k, sample_time, x, front, rear, slip_limits, plants, torques): 
 
 
 @compiled
-def _advance_lanes(  # type: ignore[no-untyped-def]
+def _advance_lanes(
     lanes,
     k,
     sample_time,

@@ -56,7 +56,7 @@ _ERROR = np.array(
 
 
 @compiled
-def set_inputs(inputs, time, front, rear, friction, grade):  # type: ignore[no-untyped-def]
+def set_inputs(inputs, time, front, rear, friction, grade):
     """Write the inputs that act at a time into a record of `INPUT_TYPE`."""
     inputs.torque_front = profile_value(time, front)
     inputs.torque_rear = profile_value(time, rear)
@@ -75,7 +75,7 @@ def fresh(x0: npt.NDArray[np.float64]) -> npt.NDArray[np.void]:
 
 
 @compiled
-def paper_solver(x, carry, stops, inputs, plant, front, rear, friction, grade, times, states):  # type: ignore[no-untyped-def]
+def paper_solver(x, carry, stops, inputs, plant, front, rear, friction, grade, times, states):
     """Integrate towards the last stop; write every accepted step.
 
     It returns when the outputs are full or after `MOST_TRIES` tries of a step, and goes on there

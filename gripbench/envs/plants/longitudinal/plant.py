@@ -121,23 +121,23 @@ def plant_record(
 
 
 @inlined
-def _fade(speed):  # type: ignore[no-untyped-def]
+def _fade(speed):
     return max(-1.0, min(1.0, speed / HOLD_SPEED))
 
 
 @inlined
-def _fade_slope(speed):  # type: ignore[no-untyped-def]
+def _fade_slope(speed):
     return 1.0 / HOLD_SPEED if abs(speed) < HOLD_SPEED else 0.0
 
 
 @inlined
-def _wheel_torque(torque, wheel_speed, radius):  # type: ignore[no-untyped-def]
+def _wheel_torque(torque, wheel_speed, radius):
     """Return the torque that acts: a brake (negative torque) only opposes the rotation."""
     return torque if torque >= 0.0 else torque * _fade(wheel_speed * radius)
 
 
 @inlined
-def _share_of_peak(slip, plant):  # type: ignore[no-untyped-def]
+def _share_of_peak(slip, plant):
     """Return the tyre force over its peak mu F_z."""
     if plant.tyre == MAGIC_FORMULA:
         return magic_formula(slip, plant.magic_b, plant.magic_c, plant.magic_e)
@@ -146,19 +146,19 @@ def _share_of_peak(slip, plant):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def tyre_force(wheel_speed, speed, mu, load, radius, plant):  # type: ignore[no-untyped-def]
+def tyre_force(wheel_speed, speed, mu, load, radius, plant):
     """Return the longitudinal tyre force of an axle [N], eq. 4-5."""
     return mu * load * _share_of_peak(slip_ratio(radius * wheel_speed, speed), plant)
 
 
 @inlined
-def gravity_along(inputs):  # type: ignore[no-untyped-def]
+def gravity_along(inputs):
     """Return gravity's component along the road [m/s^2], positive downhill."""
     return GRAVITY * sin(inputs.road_grade)
 
 
 @inlined
-def rates(speed, front, rear, force_front, force_rear, gravity, inputs, plant):  # type: ignore[no-untyped-def]
+def rates(speed, front, rear, force_front, force_rear, gravity, inputs, plant):
     """Return the time derivative of the state for given tyre forces, eq. 2-3.
 
     Parameters
@@ -185,7 +185,7 @@ def rates(speed, front, rear, force_front, force_rear, gravity, inputs, plant): 
 
 
 @inlined
-def state_rates(speed, front, rear, gravity, inputs, plant):  # type: ignore[no-untyped-def]
+def state_rates(speed, front, rear, gravity, inputs, plant):
     """Return the time derivative of the state, eq. 2-5; arguments as for `rates`."""
     force_front = tyre_force(
         front, speed, inputs.mu_front, plant.load_front, plant.radius_front, plant
@@ -195,7 +195,7 @@ def state_rates(speed, front, rear, gravity, inputs, plant):  # type: ignore[no-
 
 
 @compiled
-def derivatives(x, inputs, plant, dx):  # type: ignore[no-untyped-def]
+def derivatives(x, inputs, plant, dx):
     """Write the time derivative of the state, eq. 2-5.
 
     Parameters
@@ -213,7 +213,7 @@ def derivatives(x, inputs, plant, dx):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _tyre_slopes(wheel_speed, speed, radius, plant):  # type: ignore[no-untyped-def]
+def _tyre_slopes(wheel_speed, speed, radius, plant):
     """Return an axle's force over its peak, and its slopes to wheel speed and speed."""
     rolling = radius * wheel_speed
     slip = slip_ratio(rolling, speed)
@@ -228,7 +228,7 @@ def _tyre_slopes(wheel_speed, speed, radius, plant):  # type: ignore[no-untyped-
 
 
 @compiled
-def evaluate_tyres(x, plant, tyres):  # type: ignore[no-untyped-def]
+def evaluate_tyres(x, plant, tyres):
     """Write a record of `TYRE_TYPE`: the tyres at a state, whatever the friction."""
     tyres.front, tyres.front_wheel, tyres.front_speed = _tyre_slopes(
         x[1], x[0], plant.radius_front, plant
@@ -239,12 +239,12 @@ def evaluate_tyres(x, plant, tyres):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _torque_slope(torque, wheel_speed, radius):  # type: ignore[no-untyped-def]
+def _torque_slope(torque, wheel_speed, radius):
     return 0.0 if torque >= 0.0 else torque * radius * _fade_slope(wheel_speed * radius)
 
 
 @inlined
-def jacobian(speed, front, rear, inputs, plant, tyres):  # type: ignore[no-untyped-def]
+def jacobian(speed, front, rear, inputs, plant, tyres):
     """Return the Jacobian of the time derivative: an arrow, because the axles do not couple.
 
     Parameters

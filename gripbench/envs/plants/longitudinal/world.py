@@ -190,7 +190,7 @@ TRUTH_TYPE = record_type(
 
 
 @compiled
-def _write_truth(time, x, inputs, plant, tyres, truth):  # type: ignore[no-untyped-def]
+def _write_truth(time, x, inputs, plant, tyres, truth):
     force_front = inputs.mu_front * plant.load_front * tyres.front
     force_rear = inputs.mu_rear * plant.load_rear * tyres.rear
     gravity = gravity_along(inputs)
@@ -219,9 +219,7 @@ def _write_truth(time, x, inputs, plant, tyres, truth):  # type: ignore[no-untyp
 
 
 @compiled
-def advance_one(  # type: ignore[no-untyped-def]
-    k, sample_time, x, step, inputs, plant, integrator, jumps, tyres, work, truth
-):
+def advance_one(k, sample_time, x, step, inputs, plant, integrator, jumps, tyres, work, truth):
     """Advance from sample `k` to the next; `jumps` are the wheel speeds' relative jumps at it."""
     before = x[0]
     step = integrators.integrate(x, step, sample_time, inputs, plant, integrator, tyres, work)
@@ -234,7 +232,7 @@ def advance_one(  # type: ignore[no-untyped-def]
 
 
 @compiled
-def feel_road(inputs, road, grade, plant):  # type: ignore[no-untyped-def]
+def feel_road(inputs, road, grade, plant):
     """Apply what the place on the road and the tyres make of the friction profile; write grade.
 
     Parameters
@@ -258,7 +256,7 @@ def feel_road(inputs, road, grade, plant):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def limited(torque, wheel_speed, speed, radius, slip_limit):  # type: ignore[no-untyped-def]
+def limited(torque, wheel_speed, speed, radius, slip_limit):
     """Return what traction control and anti-lock brakes leave of a torque [N m]."""
     if slip_limit <= 0.0:
         return torque
@@ -269,7 +267,7 @@ def limited(torque, wheel_speed, speed, radius, slip_limit):  # type: ignore[no-
 
 
 @compiled
-def command(k, sample_time, friction, grade, road, plant, inputs):  # type: ignore[no-untyped-def]
+def command(k, sample_time, friction, grade, road, plant, inputs):
     """Write the road that acts from sample `k` to the next: the profile at the interval's middle.
 
     A held mean is exact for a constant and second-order accurate for a slope; a jump of a profile
@@ -282,7 +280,7 @@ def command(k, sample_time, friction, grade, road, plant, inputs):  # type: igno
 
 
 @compiled
-def decide(k, sample_time, x, front, rear, slip_limit, plant, torques):  # type: ignore[no-untyped-def]
+def decide(k, sample_time, x, front, rear, slip_limit, plant, torques):
     """Write the driver's axle torques from sample `k` to the next [N m], shape (2,)."""
     middle = (k + 0.5) * sample_time
     for i, profile, radius in ((0, front, plant.radius_front), (1, rear, plant.radius_rear)):
@@ -290,7 +288,7 @@ def decide(k, sample_time, x, front, rear, slip_limit, plant, torques):  # type:
 
 
 @compiled
-def _run(  # type: ignore[no-untyped-def]
+def _run(
     sample_time, x, step, inputs, plant, integrator, profiles, grade, road, slip_limit, jumps,
     tyres, work, truth,
 ):  # fmt: skip
@@ -314,9 +312,7 @@ def _run(  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _sampled_truth(  # type: ignore[no-untyped-def]
-    times, states, inputs, plant, profiles, grade, tyres, truth
-):
+def _sampled_truth(times, states, inputs, plant, profiles, grade, tyres, truth):
     front, rear, friction = profiles
     last = times[-1] - 1e-12  # profiles end at the horizon; its sample belongs to their inside
     for k in range(times.shape[0]):

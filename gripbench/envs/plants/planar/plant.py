@@ -173,7 +173,7 @@ def plant_record(tyre: str, vehicle: Vehicle | CarOnRoad) -> npt.NDArray[np.void
 
 
 @compiled
-def rolling_speed(speed):  # type: ignore[no-untyped-def]
+def rolling_speed(speed):
     """Return |speed|, below `SLOW_ROLLING` a parabola with half of it as its least value."""
     size = abs(speed)
     if size >= SLOW_ROLLING:
@@ -182,7 +182,7 @@ def rolling_speed(speed):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def wheel_forces(x, u, p, wheels):  # type: ignore[no-untyped-def]
+def wheel_forces(x, u, p, wheels):
     """Fill `wheels`, shape (4, WHEEL_COLUMNS); return force along x and y [N], moment [N m].
 
     The force along x includes the wind's drag, not gravity.
@@ -255,7 +255,7 @@ def wheel_forces(x, u, p, wheels):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def hold_stiffness(x, p, u):  # type: ignore[no-untyped-def]
+def hold_stiffness(x, p, u):
     """Write the stiffness of each tyre under its present load, over that at its static load.
 
     It changes as slowly as the lagged loads and is an input that is held for a step.
@@ -278,7 +278,7 @@ def hold_stiffness(x, p, u):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def derivative(x, u, p, wheels, dx):  # type: ignore[no-untyped-def]
+def derivative(x, u, p, wheels, dx):
     """Fill `dx` with the time derivative of the state under held inputs.
 
     Parameters
@@ -321,7 +321,7 @@ def derivative(x, u, p, wheels, dx):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def parts_of_step(x, u, p):  # type: ignore[no-untyped-def]
+def parts_of_step(x, u, p):
     """Return into how many parts a step must be cut: more at walking pace, else 1."""
     tyre = p.tyre_x * p.wheel_radius * p.wheel_radius / rolling_speed(x[V_X])
     stiffest = tyre
@@ -335,7 +335,7 @@ def parts_of_step(x, u, p):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def advance_step(x, u, p, wheels, work):  # type: ignore[no-untyped-def]
+def advance_step(x, u, p, wheels, work):
     """Advance the state by `STEP` in place, by the classical Runge-Kutta method.
 
     Parameters

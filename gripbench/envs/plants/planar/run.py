@@ -86,7 +86,7 @@ def to_earth(points: npt.NDArray[np.float64], heading: float) -> npt.NDArray[np.
 
 
 @compiled
-def begin(run, speed, truth, columns):  # type: ignore[no-untyped-def]
+def begin(run, speed, truth, columns):
     """Put the vehicle at the origin of the track, rolling at a speed; write the first sample.
 
     Parameters
@@ -112,7 +112,7 @@ def begin(run, speed, truth, columns):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def decide(run, k):  # type: ignore[no-untyped-def]
+def decide(run, k):
     """Write the driver's action from sample `k` to the next into the run."""
     time = k * run.driver[0].sample_time
     planned = run.planned[min(k + 1, run.planned.shape[0] - 1)]
@@ -123,7 +123,7 @@ def decide(run, k):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def act(run, k, parts, action, truth, columns, at):  # type: ignore[no-untyped-def]
+def act(run, k, parts, action, truth, columns, at):
     """Hold an action up to sample `k`, write that sample into row `at`; return a code.
 
     A state that is not finite is not written.
@@ -160,7 +160,7 @@ def act(run, k, parts, action, truth, columns, at):  # type: ignore[no-untyped-d
 
 
 @compiled
-def roll_out(run, parts, truth, columns):  # type: ignore[no-untyped-def]
+def roll_out(run, parts, truth, columns):
     """Run from the first sample to the end; return the number of samples and a code."""
     code = GOES_ON
     count = 1
@@ -176,7 +176,7 @@ def roll_out(run, parts, truth, columns):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _write(run, k, truth, columns, at):  # type: ignore[no-untyped-def]
+def _write(run, k, truth, columns, at):
     site = run.site
     write_truth(
         k * run.driver[0].sample_time, run.state, run.inputs, run.plant[0], site[HEADING],
@@ -186,7 +186,7 @@ def _write(run, k, truth, columns, at):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _end_of(run):  # type: ignore[no-untyped-def]
+def _end_of(run):
     """Return the code of the reason to end here, `GOES_ON` if there is none."""
     x, wheels = run.state, run.wheels
     on_path = run.path.shape[0] > 0

@@ -73,7 +73,7 @@ _FIRST_WHEEL = len(_SCALARS)
 
 
 @compiled
-def write_truth(time, x, u, p, heading, north, up, disturbance, wheels, dx, row, columns):  # type: ignore[no-untyped-def]
+def write_truth(time, x, u, p, heading, north, up, disturbance, wheels, dx, row, columns):
     """Write one sample of the truth.
 
     Parameters
@@ -158,7 +158,7 @@ def write_truth(time, x, u, p, heading, north, up, disturbance, wheels, dx, row,
 
 
 @compiled
-def _write_wheels(x, u, p, wheels, row, columns):  # type: ignore[no-untyped-def]
+def _write_wheels(x, u, p, wheels, row, columns):
     available = 0.0
     used = 0.0
     for i in range(4):
