@@ -250,6 +250,8 @@ def test_any_words_can_be_stored_and_stay_on_one_line(title, reason):
     assert len(text.splitlines()) == 1
     assert len(text) < 25_000
     for words in (back.title, back.reason):
-        assert words.isprintable() or " " in words
+        # spaces of every kind stay; what breaks, hides or turns a line does not
+        assert all(letter.isprintable() or letter.isspace() for letter in words)
+        assert len(words.splitlines()) <= 1
     if title.isascii() and title.isprintable() and len(title) < 100:
         assert back.title == title
