@@ -18,6 +18,7 @@ from gripbench.bench.publishing.method_pages import catalogue_page
 ROOT = Path(__file__).parents[2]
 sys.path.append(str(Path(__file__).parent))
 from printed import refreshed  # noqa: E402 - a module of this folder, which is no package
+
 _LINK = re.compile(r"(?<!!)\[([^\]]*)\]\((\.\./[^)\s]+)\)")
 _FORMULA = re.compile(r'<(span|div) class="arithmatex">\\([(\[])(.*?)\\[)\]]</\1>', re.DOTALL)
 
