@@ -26,7 +26,8 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 CACHE = ROOT / ".cache" / "printed"
 BLOCK = re.compile(
-    r"(?P<head><!-- printed by: (?P<command>gripbench [^\n]+?) -->\n+```\w*\n)(?P<text>.*?)(?P<tail>```)",
+    r"(?P<head><!-- printed by: (?P<command>gripbench [^\n]+?) -->\n+```\w*\n)"
+    r"(?P<text>.*?)(?P<tail>```)",
     re.DOTALL,
 )
 
