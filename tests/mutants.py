@@ -31,13 +31,13 @@ class Mutant(NamedTuple):
 
 MUTANTS = (
     Mutant(
-        "envs/instruments/sensors.py",
+        "envs/instruments/suite.py",
         "sensor.scale + sensor.scale_std * constant[1]",
         "sensor.scale + sensor.scale_std * constant[0]",
         "tests/envs/test_sensors.py",
     ),
     Mutant(
-        "envs/instruments/sensors.py",
+        "envs/instruments/measuring.py",
         "spec.walk * np.sqrt(elapsed) * walk[j]",
         "spec.walk * elapsed * walk[j]",
         "tests/envs/test_sensors.py",

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gripbench.envs.signals import select_channels as select_channels
 from gripbench.envs.vehicles import CarOnPaper
 
 

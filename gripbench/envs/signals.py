@@ -12,14 +12,14 @@ tables, pictures and pages alike: degrees for angles, degrees a second for the b
 from __future__ import annotations
 
 import math
-from collections.abc import Container, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-from gripbench.errors import InputError, UndeclaredChannelError, nearest, unknown
+from gripbench.errors import InputError, unknown
 from gripbench.extensions import entry_points, load
 
 VARIANCE = "_variance"
@@ -359,44 +359,3 @@ def record_type(names: Iterable[str]) -> np.dtype:
         Signal names, in the order of the fields.
     """
     return np.dtype([(signal(name).name, np.float64) for name in names])
-
-
-def is_given(channel: str, present: Container[str]) -> bool:
-    """Return whether a method can be given a channel; a flag comes with its channel."""
-    return channel in present or (channel.endswith(NEW) and channel.removesuffix(NEW) in present)
-
-
-def select_channels(observations: npt.NDArray[Any], channels: tuple[str, ...]) -> npt.NDArray[Any]:
-    """Return a copy of the observations that holds the given channels and `time` only.
-
-    Parameters
-    ----------
-    observations
-        Structured array, shape (n,).
-    channels
-        Names of the channels that a method declared. The `_new` flag of a sensor as fast as the
-        samples need not be there: it is 1 wherever the channel is finite.
-
-    Returns
-    -------
-    Structured array, shape (n,), with the fields `channels` in their order, then `time`.
-
-    Raises
-    ------
-    UndeclaredChannelError
-        If the observations lack a channel.
-    """
-    names = (*channels, "time")
-    present = observations.dtype.names or ()
-    for name in names:
-        if not is_given(name, present):
-            raise UndeclaredChannelError(
-                f"the recording has no channel '{name}': {nearest(name, present)}"
-            )
-    selected = np.empty(observations.shape, [(name, np.float64) for name in names])
-    for name in names:
-        if name in present:
-            selected[name] = observations[name]
-        else:
-            selected[name] = np.isfinite(observations[name.removesuffix(NEW)])
-    return selected

@@ -13,14 +13,13 @@ import numpy as np
 import numpy.typing as npt
 
 from gripbench.configuration import CONFIGS, named_file, parse, read_toml
-from gripbench.envs.instruments.faults import Faults, check_present, choose_fault, split_faults
-from gripbench.envs.instruments.sensors import Sensor, SensorSuite
+from gripbench.envs.instruments.fault_injection import Faults
+from gripbench.envs.instruments.faults import check_present, choose_fault, split_faults
+from gripbench.envs.instruments.sensors import Sensor
+from gripbench.envs.instruments.suite import SensorSuite
 from gripbench.envs.plants.bicycle import BicycleScenario, BicycleSimulation
-from gripbench.envs.plants.longitudinal.world import (
-    PAPER_SOLVER,
-    LongitudinalScenario,
-    LongitudinalSimulation,
-)
+from gripbench.envs.plants.longitudinal.scenario import PAPER_SOLVER, LongitudinalScenario
+from gripbench.envs.plants.longitudinal.world import LongitudinalSimulation
 from gripbench.envs.plants.planar.world import PlanarScenario, PlanarSimulation
 from gripbench.envs.plants.simulation import Lanes, Simulation
 from gripbench.envs.populations.draws import draw

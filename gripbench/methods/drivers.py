@@ -15,9 +15,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from gripbench.envs.signals import NEW, select_channels
+from gripbench.envs.signals import NEW
 from gripbench.errors import GripbenchError, UndeclaredChannelError
-from gripbench.methods.samples import CLOCK_FIELDS, admit, layout_of, memory_of, regular
+from gripbench.methods.samples import (
+    CLOCK_FIELDS,
+    admit,
+    layout_of,
+    memory_of,
+    regular,
+    select_channels,
+)
 
 if TYPE_CHECKING:
     from gripbench.methods.contract import CompiledMethod

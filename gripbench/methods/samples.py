@@ -16,11 +16,15 @@ Where a step is not called its estimates hold.
 
 from __future__ import annotations
 
+from collections.abc import Container
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
 from gripbench.compilation import compiled
 from gripbench.envs.signals import NEW, signal
+from gripbench.errors import UndeclaredChannelError, nearest
 
 LATE = 1.0
 """Time [s] up to which a sample from the past is late; beyond it the clock has been set back."""
@@ -30,6 +34,47 @@ CLOCK_FIELDS = ("time", "elapsed", "first")
 the first one."""
 
 FLAG, OPTIONAL, CLOCK = 1, 2, 4
+
+
+def is_given(channel: str, present: Container[str]) -> bool:
+    """Return whether a method can be given a channel; a flag comes with its channel."""
+    return channel in present or (channel.endswith(NEW) and channel.removesuffix(NEW) in present)
+
+
+def select_channels(observations: npt.NDArray[Any], channels: tuple[str, ...]) -> npt.NDArray[Any]:
+    """Return a copy of the observations that holds the given channels and `time` only.
+
+    Parameters
+    ----------
+    observations
+        Structured array, shape (n,).
+    channels
+        Names of the channels that a method declared. The `_new` flag of a sensor as fast as the
+        samples need not be there: it is 1 wherever the channel is finite.
+
+    Returns
+    -------
+    Structured array, shape (n,), with the fields `channels` in their order, then `time`.
+
+    Raises
+    ------
+    UndeclaredChannelError
+        If the observations lack a channel.
+    """
+    names = (*channels, "time")
+    present = observations.dtype.names or ()
+    for name in names:
+        if not is_given(name, present):
+            raise UndeclaredChannelError(
+                f"the recording has no channel '{name}': {nearest(name, present)}"
+            )
+    selected = np.empty(observations.shape, [(name, np.float64) for name in names])
+    for name in names:
+        if name in present:
+            selected[name] = observations[name]
+        else:
+            selected[name] = np.isfinite(observations[name.removesuffix(NEW)])
+    return selected
 
 
 def layout_of(names: tuple[str, ...]) -> npt.NDArray[np.int64]:

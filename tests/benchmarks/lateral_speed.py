@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter, KalmanFilter
 
-from gripbench.envs.recordings import select_channels
 from gripbench.envs.vehicles import GRAVITY
 from gripbench.envs.worlds import load_scenario, record
 from gripbench.methods.friction_ekf import lateral_acceleration, slip_angles
 from gripbench.methods.magnetometer_gps_cascade import MagnetometerGpsCascade
+from gripbench.methods.samples import select_channels
 from gripbench.methods.velocity_friction_ekf import VelocityFrictionEkf
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "methods"))

@@ -17,7 +17,7 @@ from gripbench.envs.plants.longitudinal.plant import (
     jacobian,
     plant_record,
 )
-from gripbench.envs.plants.longitudinal.world import TRUTH_TYPE
+from gripbench.envs.plants.longitudinal.sampling import TRUTH_TYPE
 from gripbench.envs.vehicles import GRAVITY, load_vehicle
 from gripbench.envs.worlds import load_scenario, record, simulation_of
 from gripbench.methods.extended_kalman_filter import ExtendedKalmanFilter

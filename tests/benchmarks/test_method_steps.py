@@ -12,8 +12,8 @@ import pytest
 from gripbench.bench.catalogue.registry import built_in_methods, choose_method
 from gripbench.bench.publishing.timings import FORM, LABEL, STEPS
 from gripbench.bench.running.execution import missing
-from gripbench.envs.recordings import select_channels
 from gripbench.envs.worlds import load_scenario, record, scenario_files
+from gripbench.methods.samples import select_channels
 
 ONLINE_CALLS = 500
 

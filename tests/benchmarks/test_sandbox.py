@@ -8,7 +8,7 @@ import gripbench
 from gripbench.bench.catalogue.registry import choose_method
 from gripbench.bench.running.execution import execute
 from gripbench.bench.running.sandbox import Limits, Sandbox, end_declaring
-from gripbench.envs.recordings import select_channels
+from gripbench.methods.samples import select_channels
 
 SOUND = Path(__file__).parents[1] / "plugins" / "kinds" / "sound.py"
 SAMPLES = 2000

@@ -3,7 +3,7 @@
 import numpy as np
 
 from gripbench.configuration import parse
-from gripbench.envs.plants.longitudinal.world import LongitudinalScenario
+from gripbench.envs.plants.longitudinal.scenario import LongitudinalScenario
 from gripbench.envs.worlds import load_scenario
 
 GRAVITY = 9.81

@@ -7,8 +7,8 @@ import pytest
 from gripbench.bench.catalogue.registry import find_scenario
 from gripbench.envs.gym.environment import VehicleEnvironment
 from gripbench.envs.gym.vector_environment import VehicleVectorEnvironment
+from gripbench.envs.instruments.fault_injection import Faults
 from gripbench.envs.instruments.faults import (
-    Faults,
     choose_fault,
     fault_files,
     load_fault,

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from planar_cases import OPEN_LOOP, SCENARIOS, held, scenario_of, simulation_of, vehicle_with
 
-from gripbench.envs.instruments.sensors import SensorSuite
+from gripbench.envs.instruments.suite import SensorSuite
 from gripbench.envs.plants.planar.truth import TRUTH
 from gripbench.envs.plants.planar.world import PlanarSimulation
 from gripbench.envs.vehicles import load_vehicle

@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gripbench.configuration import parse
-from gripbench.envs.instruments.sensors import Sensor, SensorSuite, load_sensor_suite
+from gripbench.envs.instruments.sensors import Sensor, load_sensor_suite
+from gripbench.envs.instruments.suite import SensorSuite
 from gripbench.envs.signals import record_type
 from gripbench.errors import InputError
 

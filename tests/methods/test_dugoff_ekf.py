@@ -7,12 +7,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lateral_twins import dugoff_model
 
-from gripbench.envs.recordings import select_channels
 from gripbench.envs.tyres.combined import DUGOFF, combined_force
 from gripbench.envs.vehicles import load_vehicle
 from gripbench.envs.worlds import load_scenario, record
 from gripbench.methods.blocks.dugoff_tyre import dugoff_force, dugoff_slips
 from gripbench.methods.dugoff_ekf import DugoffEkf, evaluate
+from gripbench.methods.samples import select_channels
 
 VEHICLE = load_vehicle("dakhlallah2008").values()
 WHEELS = ("front_left", "front_right", "rear_left", "rear_right")

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from gripbench.bench.catalogue.registry import built_in_methods
 from gripbench.bench.running.execution import missing
-from gripbench.envs.signals import NEW, VARIANCE, select_channels
+from gripbench.envs.signals import NEW, VARIANCE
 from gripbench.envs.worlds import load_scenario, record
 from gripbench.methods.contract import CompiledMethod, compiled
-from gripbench.methods.samples import LATE, admit, layout_of, memory_of
+from gripbench.methods.samples import LATE, admit, layout_of, memory_of, select_channels
 
 NAMES = ("accel_x", "course", "course_new", "speed_gps", "gps_time", "time")
 NAN = np.nan

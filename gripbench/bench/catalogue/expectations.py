@@ -14,8 +14,9 @@ from gripbench.bench.catalogue import distortions
 from gripbench.bench.catalogue.declarations import Declaration
 from gripbench.bench.running.execution import ONLINE_SAMPLES
 from gripbench.bench.running.sandbox import CellFailure
-from gripbench.envs.recordings import Recording, select_channels
+from gripbench.envs.recordings import Recording
 from gripbench.envs.signals import VARIANCE
+from gripbench.methods.samples import select_channels
 
 SAMPLES = 2000
 """Samples of the recording that most checks run on."""

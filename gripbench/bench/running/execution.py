@@ -14,8 +14,9 @@ import numpy.typing as npt
 from gripbench.bench.catalogue.declarations import Declaration
 from gripbench.bench.running.rows import Runtime
 from gripbench.bench.scoring.scoring import EstimateError
-from gripbench.envs.signals import is_given, record_type, select_channels
+from gripbench.envs.signals import record_type
 from gripbench.errors import GripbenchError, UndeclaredChannelError, nearest
+from gripbench.methods.samples import is_given, select_channels
 
 ONLINE_SAMPLES = 2000
 """Number of single calls whose time is taken where the batch form made the estimates."""

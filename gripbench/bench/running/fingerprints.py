@@ -22,6 +22,7 @@ import gripbench
 from gripbench.bench.running import recorded_scenarios
 from gripbench.bench.scoring.metrics import metrics
 from gripbench.envs import worlds
+from gripbench.envs.instruments.fault_injection import Faults
 from gripbench.envs.instruments.faults import choose_fault
 from gripbench.envs.populations.draws import drawn_from
 from gripbench.envs.scenarios import Scenario
@@ -68,13 +69,13 @@ def scenario_digest(scenario: Scenario) -> str:
     if scenario.faults:
         chosen = [choose_fault(text).fault for text in scenario.faults]
         content["faults"] = [fault.model_dump() for fault in chosen]
-        files.append(Path(inspect.getfile(choose_fault)))
+        files.append(Path(inspect.getfile(Faults)))
     sources = source_digest(*files, *(_PROJECT / "envs" / name for name in _RECORDING))
     return digest(json.dumps(content, sort_keys=True), sources, inspect.getsource(worlds.record))
 
 
 _RECORDED = _PROJECT / "logs" / "excitation.py"
-_RECORDING = ("instruments/sensors.py", "recordings.py", "vehicles.py", "plants/simulation.py")
+_RECORDING = ("instruments/suite.py", "recordings.py", "vehicles.py", "plants/simulation.py")
 
 
 @cache

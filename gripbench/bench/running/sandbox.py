@@ -34,9 +34,9 @@ from gripbench.bench.running.messages import (
     requests_of,
 )
 from gripbench.bench.running.processes import VARIABLE, PluginProcess, start_plugin, stop_starters
-from gripbench.envs.recordings import select_channels
 from gripbench.envs.signals import record_type
 from gripbench.errors import LONGEST, GripbenchError, InputError, one_line
+from gripbench.methods.samples import select_channels
 
 LOADING = 60.0
 """Time [s] that loading and compiling a plug-in may take; no cell's limit counts it."""

@@ -28,8 +28,9 @@ from gripbench.bench.running.store import Store
 from gripbench.bench.scoring.scoring import DivergedError, Scores, score, targets_of
 from gripbench.envs.recordings import Recording
 from gripbench.envs.scenarios import Scenario
-from gripbench.envs.signals import SIGNALS, VARIANCE, is_given, record_type
+from gripbench.envs.signals import SIGNALS, VARIANCE, record_type
 from gripbench.errors import InputError, unknown
+from gripbench.methods.samples import is_given
 from gripbench.sources import digest
 
 Floats = npt.NDArray[np.float64]

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from gripbench.configuration import parse
 from gripbench.envs.plants.driven import DrivenScenario
-from gripbench.envs.plants.longitudinal.world import LongitudinalScenario
+from gripbench.envs.plants.longitudinal.scenario import LongitudinalScenario
 from gripbench.envs.plants.planar.world import PlanarScenario
 from gripbench.envs.scenarios import Scenario
 from gripbench.errors import InputError, nearest

@@ -9,8 +9,8 @@ import numpy.typing as npt
 from gymnasium import spaces
 
 from gripbench.envs.gym.arguments import scenario_with
-from gripbench.envs.instruments.faults import Faults
-from gripbench.envs.instruments.sensors import SensorSuite
+from gripbench.envs.instruments.fault_injection import Faults
+from gripbench.envs.instruments.suite import SensorSuite
 from gripbench.envs.plants.simulation import Simulation
 from gripbench.envs.populations.draws import paper_of
 from gripbench.envs.scenarios import Scenario

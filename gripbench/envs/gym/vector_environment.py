@@ -28,8 +28,8 @@ from gripbench.envs.gym.arguments import (
 from gripbench.envs.gym.environment import ActionMap
 from gripbench.envs.gym.episodes import Episodes, observation_space
 from gripbench.envs.gym.rendering import RENDER_MODES, TopView, checked_mode
-from gripbench.envs.instruments.faults import Faults
-from gripbench.envs.instruments.sensors import SensorLanes
+from gripbench.envs.instruments.fault_injection import Faults
+from gripbench.envs.instruments.suite import SensorLanes
 
 Observations = dict[str, npt.NDArray[np.float64]]
 

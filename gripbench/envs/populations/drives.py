@@ -15,7 +15,7 @@ from gripbench.envs.drivers.path_drivers import (
 from gripbench.envs.drivers.profiles import Segment
 from gripbench.envs.plants.bicycle import BicycleScenario
 from gripbench.envs.plants.driven import DrivenScenario
-from gripbench.envs.plants.longitudinal.world import PAPER_SOLVER, LongitudinalScenario
+from gripbench.envs.plants.longitudinal.scenario import PAPER_SOLVER, LongitudinalScenario
 from gripbench.envs.roads.paths import DoubleLaneChange, Path, PublicRoad, Slalom
 from gripbench.envs.roads.road import Road
 from gripbench.envs.scenarios import Scenario

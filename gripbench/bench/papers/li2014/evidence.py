@@ -19,8 +19,9 @@ from gripbench.bench.papers.li2014 import evidence_figures as figures
 from gripbench.bench.papers.li2014 import tables as paper_tables
 from gripbench.bench.papers.li2014.tables import MethodColumn, Outcome, RecordingMethod
 from gripbench.bench.publishing.columns import Column, Table
-from gripbench.envs.instruments.sensors import SensorSuite
-from gripbench.envs.plants.longitudinal.world import LongitudinalScenario, LongitudinalSimulation
+from gripbench.envs.instruments.suite import SensorSuite
+from gripbench.envs.plants.longitudinal.scenario import LongitudinalScenario
+from gripbench.envs.plants.longitudinal.world import LongitudinalSimulation
 from gripbench.envs.recordings import Recording
 from gripbench.envs.scenarios import Scenario
 from gripbench.envs.vehicles import GRAVITY, CarOnPaper, load_vehicle

@@ -10,7 +10,8 @@ import numpy.typing as npt
 from gripbench.compilation import compiled
 from gripbench.envs.instruments.sensors import Sensor
 from gripbench.envs.plants.longitudinal.plant import plant_record
-from gripbench.envs.plants.longitudinal.world import LongitudinalScenario, LongitudinalSimulation
+from gripbench.envs.plants.longitudinal.scenario import LongitudinalScenario
+from gripbench.envs.plants.longitudinal.world import LongitudinalSimulation
 from gripbench.envs.recordings import Recording
 from gripbench.envs.vehicles import GRAVITY, Vehicle, load_vehicle
 from gripbench.envs.worlds import load_scenario, record

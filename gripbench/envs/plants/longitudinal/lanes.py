@@ -10,14 +10,8 @@ import numpy.typing as npt
 
 from gripbench.compilation import compiled
 from gripbench.envs.plants.longitudinal.plant import INPUT_TYPE, TYRE_TYPE
-from gripbench.envs.plants.longitudinal.world import (
-    NOISE_BLOCK,
-    TRUTH_TYPE,
-    LongitudinalSimulation,
-    advance_one,
-    command,
-    decide,
-)
+from gripbench.envs.plants.longitudinal.sampling import TRUTH_TYPE, advance_one, command, decide
+from gripbench.envs.plants.longitudinal.world import NOISE_BLOCK, LongitudinalSimulation
 from gripbench.envs.plants.simulation import Lanes, Simulation
 
 
