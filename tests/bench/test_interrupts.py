@@ -13,8 +13,8 @@ from gripbench.bench.catalogue.registry import choose_method, find_scenario
 from gripbench.bench.running import cells
 from gripbench.bench.running.backends import Backend
 from gripbench.bench.running.deadline import DeadlineError, deadline
+from gripbench.bench.running.isolation.limits import Limits
 from gripbench.bench.running.runner import Plan, run_plan
-from gripbench.bench.running.sandbox import Limits
 from gripbench.bench.running.store import Store
 
 COMMAND = (sys.executable, "-m", "gripbench.bench.command_line")

@@ -12,8 +12,9 @@ import pytest
 import gripbench
 from gripbench.bench.catalogue.check import check_estimator, failures
 from gripbench.bench.catalogue.registry import choose_method
-from gripbench.bench.running import processes
-from gripbench.bench.running.sandbox import CellFailure, Limits, Sandbox
+from gripbench.bench.running.isolation import processes
+from gripbench.bench.running.isolation.limits import CellFailure, Limits
+from gripbench.bench.running.isolation.sandbox import Sandbox
 from gripbench.errors import InputError
 
 FAULTS = {

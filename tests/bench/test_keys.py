@@ -10,8 +10,8 @@ from gripbench.bench.running import cells, fingerprints
 from gripbench.bench.running.backends import Backend
 from gripbench.bench.running.cells import OtherCodeError, cell_of, run_task
 from gripbench.bench.running.fingerprints import world_digest
+from gripbench.bench.running.isolation.limits import Limits
 from gripbench.bench.running.runner import Plan, run_plan
-from gripbench.bench.running.sandbox import Limits
 from gripbench.bench.running.store import Store, read_rows
 from gripbench.errors import InputError
 

@@ -7,7 +7,9 @@ import pytest
 import gripbench
 from gripbench.bench.catalogue.registry import choose_method
 from gripbench.bench.running.execution import execute
-from gripbench.bench.running.sandbox import Limits, Sandbox, end_declaring
+from gripbench.bench.running.isolation.limits import Limits
+from gripbench.bench.running.isolation.processes import stop_starters
+from gripbench.bench.running.isolation.sandbox import Sandbox
 from gripbench.methods.samples import select_channels
 
 SOUND = Path(__file__).parents[1] / "plugins" / "kinds" / "sound.py"
@@ -33,7 +35,7 @@ def test_cell_in_the_sandbox(benchmark, spec, recording):
         recording.observations[:SAMPLES], 1e-3,
     )  # fmt: skip
     sandbox.close()
-    end_declaring()
+    stop_starters()
     assert len(outcome.estimates) == SAMPLES
 
 

@@ -33,8 +33,10 @@ from gripbench.bench.catalogue.registry import (
     split_choice,
 )
 from gripbench.bench.running.execution import missing
-from gripbench.bench.running.sandbox import CellFailure, Limits, Sandbox, Settings
-from gripbench.bench.running.trials import Trial, has_batch, perform
+from gripbench.bench.running.isolation.limits import CellFailure, Limits
+from gripbench.bench.running.isolation.loading import Settings
+from gripbench.bench.running.isolation.sandbox import Sandbox
+from gripbench.bench.running.isolation.trials import Trial, has_batch, perform
 from gripbench.bench.scoring.scoring import EstimateError
 from gripbench.envs.recordings import Recording
 from gripbench.envs.scenarios import Scenario

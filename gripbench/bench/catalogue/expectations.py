@@ -13,7 +13,7 @@ import numpy.typing as npt
 from gripbench.bench.catalogue import distortions
 from gripbench.bench.catalogue.declarations import Declaration
 from gripbench.bench.running.execution import ONLINE_SAMPLES
-from gripbench.bench.running.sandbox import CellFailure
+from gripbench.bench.running.isolation.limits import CellFailure
 from gripbench.envs.recordings import Recording
 from gripbench.envs.signals import VARIANCE
 from gripbench.methods.samples import select_channels

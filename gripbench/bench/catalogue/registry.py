@@ -260,7 +260,7 @@ def choose_method(
         variant = ""  # the default of every built-in: one name for one thing
     isolated = is_isolated(source)
     if isolated and source.kind != "value":
-        from gripbench.bench.running.sandbox import (
+        from gripbench.bench.running.isolation.sandbox import (
             declare,  # a plug-in's code runs in its sandbox only
         )
 

@@ -52,7 +52,7 @@ def check(
     from gripbench.bench.publishing.presentation import console
     from gripbench.bench.running.api import limits_of
     from gripbench.bench.running.check_records import keep_record
-    from gripbench.bench.running.processes import choose_sandbox
+    from gripbench.bench.running.isolation.processes import choose_sandbox
 
     choose_sandbox(sandbox)
     out = console()

@@ -111,7 +111,7 @@ def run(
     from gripbench.bench.running.api import limits_of, order_in, plan_of
     from gripbench.bench.running.backends import Backend
     from gripbench.bench.running.fault_plans import with_fault_scenarios
-    from gripbench.bench.running.processes import choose_sandbox
+    from gripbench.bench.running.isolation.processes import choose_sandbox
     from gripbench.bench.running.recorded_scenarios import PREFIX
     from gripbench.bench.running.rows import Row, frame_of, untracked
     from gripbench.bench.running.runner import InterruptedRun, run_plan

@@ -17,7 +17,7 @@ import pandas as pd
 
 from gripbench.bench.catalogue.registry import MethodSpec, built_in_methods, choose_method
 from gripbench.bench.running.cells import cell_of, close_sandboxes, run_cell
-from gripbench.bench.running.sandbox import Limits
+from gripbench.bench.running.isolation.limits import Limits
 from gripbench.envs.populations.causes import CAUSES, PROCESSES, SHAPES_OF_TYRES, SIDES
 from gripbench.envs.populations.population import load_population
 from gripbench.envs.scenarios import Scenario

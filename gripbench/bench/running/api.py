@@ -17,10 +17,10 @@ from gripbench.bench.catalogue.registry import (
 )
 from gripbench.bench.running.backends import Backend
 from gripbench.bench.running.execution import missing
+from gripbench.bench.running.isolation.limits import Limits
 from gripbench.bench.running.recorded_scenarios import recording_of
 from gripbench.bench.running.rows import Row, frame_of
 from gripbench.bench.running.runner import Plan, run_plan
-from gripbench.bench.running.sandbox import Limits
 from gripbench.bench.running.store import DEFAULT_RESULTS, Store
 from gripbench.bench.scoring.scoring import targets_of
 from gripbench.envs.scenarios import LEVELS, Scenario

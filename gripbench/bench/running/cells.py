@@ -21,7 +21,9 @@ from gripbench.bench.running.deadline import DeadlineError, deadline
 from gripbench.bench.running.dependencies import folder_of, kept, unchanged
 from gripbench.bench.running.execution import Outcome, SkippedError, execute, missing
 from gripbench.bench.running.fingerprints import versions, world_digest
-from gripbench.bench.running.processes import stop_starters
+from gripbench.bench.running.isolation.limits import CellFailure, Limits
+from gripbench.bench.running.isolation.processes import stop_starters
+from gripbench.bench.running.isolation.sandbox import Sandbox
 from gripbench.bench.running.recorded_scenarios import (
     RecordedScenario,
     judged,
@@ -29,7 +31,6 @@ from gripbench.bench.running.recorded_scenarios import (
     recording_of,
 )
 from gripbench.bench.running.rows import Row, Status
-from gripbench.bench.running.sandbox import CellFailure, Limits, Sandbox
 from gripbench.bench.running.store import row_path
 from gripbench.bench.scoring.recovery import RECOVERY, recovery
 from gripbench.bench.scoring.scoring import DivergedError, score, targets_of

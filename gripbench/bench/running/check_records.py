@@ -111,6 +111,6 @@ def _read(path: Path) -> CheckRecord | None:
 def checks_digest() -> str:
     """Return the digest of the checks: another one makes every record old."""
     from gripbench.bench.catalogue import distortions, expectations
-    from gripbench.bench.running import trials
+    from gripbench.bench.running.isolation import trials
 
     return digest(*(inspect.getsource(module) for module in (distortions, expectations, trials)))

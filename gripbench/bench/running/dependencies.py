@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from gripbench.bench.catalogue.registry import MethodSpec
-from gripbench.bench.running.audit import ABSENT, digest_of
-from gripbench.bench.running.processes import environment
+from gripbench.bench.running.isolation.audit import ABSENT, digest_of
+from gripbench.bench.running.isolation.processes import environment
 
 
 def folder_of(method: MethodSpec) -> Path:

@@ -55,7 +55,7 @@ class Outcome:
     runtime
         Times of its steps [s].
     read
-        What an isolated method was seen to read, see `running.audit.report`.
+        What an isolated method was seen to read, see `running.isolation.audit.report`.
     """
 
     estimates: npt.NDArray[Any]

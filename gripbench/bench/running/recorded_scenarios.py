@@ -199,7 +199,7 @@ def on_recording(spec: MethodSpec, scenario: Scenario) -> MethodSpec:
 
     try:
         if spec.isolated and spec.source.kind != "value":
-            from gripbench.bench.running.sandbox import declare
+            from gripbench.bench.running.isolation.sandbox import declare
 
             declaration = declare(spec.source, spec.variant, settings)
         else:

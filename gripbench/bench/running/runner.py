@@ -21,9 +21,10 @@ from gripbench.bench.running.backends import Backend, WorkerLostError
 from gripbench.bench.running.cells import Cell, Task, cell_of, close_sandboxes, run_tasks
 from gripbench.bench.running.dependencies import folder_of, unchanged
 from gripbench.bench.running.fingerprints import world_digest
+from gripbench.bench.running.isolation.limits import Limits
+from gripbench.bench.running.isolation.processes import stop_starters
 from gripbench.bench.running.recorded_scenarios import RecordedScenario, on_recording
 from gripbench.bench.running.rows import Row
-from gripbench.bench.running.sandbox import Limits, end_declaring
 from gripbench.bench.running.store import DamagedRowError, Store
 from gripbench.envs.scenarios import Scenario
 from gripbench.errors import InputError
@@ -177,7 +178,7 @@ def run_plan(
         ) from None
     finally:
         close_sandboxes()
-        end_declaring()
+        stop_starters()
     report.seconds = time.perf_counter() - began
     return report
 

@@ -10,7 +10,7 @@ import threading
 import time
 from typing import Any
 
-from gripbench.bench.running.messages import message_bytes
+from gripbench.bench.running.isolation.messages import message_bytes
 
 
 class LateError(Exception):

@@ -18,9 +18,9 @@ from pathlib import Path
 from typing import Any
 
 import gripbench
-from gripbench.bench.running.confinement import end_tree
-from gripbench.bench.running.lines import LateError, Line
-from gripbench.bench.running.messages import message_bytes, read_message
+from gripbench.bench.running.isolation.confinement import end_tree
+from gripbench.bench.running.isolation.lines import LateError, Line
+from gripbench.bench.running.isolation.messages import message_bytes, read_message
 from gripbench.errors import GripbenchError, InputError, unknown
 
 FORKS = sys.platform == "linux"
@@ -39,7 +39,7 @@ spec = importlib.util.spec_from_file_location(
 )
 sys.modules["gripbench"] = module = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(module)
-from gripbench.bench.running.plugin_process import serve
+from gripbench.bench.running.isolation.plugin_process import serve
 serve(forks == "forks")
 """
 """What such an interpreter runs first: it takes gripbench from where this one has it."""

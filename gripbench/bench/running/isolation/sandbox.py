@@ -8,14 +8,8 @@ the cell that it was working on is lost. `plugin_process` is the other side.
 
 from __future__ import annotations
 
-import base64
-import hashlib
-import os
-import signal as signals
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
@@ -23,8 +17,21 @@ import numpy.typing as npt
 
 from gripbench.bench.catalogue.declarations import Declaration, Source, declaration_from
 from gripbench.bench.running.execution import Outcome, runtime_of
-from gripbench.bench.running.lines import LateError, Line
-from gripbench.bench.running.messages import (
+from gripbench.bench.running.isolation.limits import (
+    FROM_OUTSIDE,
+    CellFailure,
+    Limits,
+    last_words,
+)
+from gripbench.bench.running.isolation.lines import LateError, Line
+from gripbench.bench.running.isolation.loading import (
+    Loaded,
+    Settings,
+    generator_seed,
+    loading_message,
+    read_by,
+)
+from gripbench.bench.running.isolation.messages import (
     ESTIMATES,
     FAILURE,
     FINISHED,
@@ -33,9 +40,9 @@ from gripbench.bench.running.messages import (
     reply_type,
     requests_of,
 )
-from gripbench.bench.running.processes import VARIABLE, PluginProcess, start_plugin, stop_starters
+from gripbench.bench.running.isolation.processes import PluginProcess, start_plugin
 from gripbench.envs.signals import record_type
-from gripbench.errors import LONGEST, GripbenchError, InputError, one_line
+from gripbench.errors import LONGEST, InputError, one_line
 from gripbench.methods.samples import select_channels
 
 LOADING = 60.0
@@ -43,77 +50,6 @@ LOADING = 60.0
 
 ENDING = 10.0
 """Time [s] in which a process that has said that it is done has to end."""
-
-
-@dataclass(frozen=True)
-class Limits:
-    """What one cell of an isolated method may take.
-
-    Attributes
-    ----------
-    time
-        Wall-clock time [s] of its samples; loading and compiling come before.
-    memory
-        Memory [bytes] beyond what the empty process has.
-    sandbox
-        Kind of sandbox, of `processes.SANDBOXES`; by default what the environment's variable
-        GRIPBENCH_SANDBOX says.
-    """
-
-    time: float = 60.0
-    memory: int = 2 * 1024**3
-    sandbox: str = field(default_factory=lambda: os.environ.get(VARIABLE, ""))
-
-
-class CellFailure(GripbenchError):  # noqa: N818 - a result of a cell, not a mistake of the harness
-    """A method failed; `status` says how.
-
-    `read` is what it was seen to read, `memory` the limit [MiB] that ended it, and `outside` tells
-    whether something else than the method and its limits did.
-    """
-
-    def __init__(
-        self,
-        status: str,
-        reason: str,
-        *,
-        read: Mapping[str, Any] | None = None,
-        memory: float | None = None,
-        outside: bool = False,
-    ) -> None:
-        super().__init__(reason)
-        self.status = status
-        self.read = read or {}
-        self.memory = memory
-        self.outside = outside
-
-
-@dataclass(frozen=True)
-class Settings:
-    """Which plug-in, and with what its constructor is called."""
-
-    source: Source
-    variant: str
-    parameters: Mapping[str, Any]
-
-
-@dataclass(frozen=True)
-class Loaded:
-    """What a plug-in says of itself when it has been loaded.
-
-    Attributes
-    ----------
-    declaration
-        What it declares.
-    batch
-        Whether it has a form that takes a whole recording.
-    expected_failures
-        Checks that it is known to fail, each with the reason.
-    """
-
-    declaration: Declaration
-    batch: bool
-    expected_failures: dict[str, str]
 
 
 class Sandbox:
@@ -199,7 +135,7 @@ class Sandbox:
             if before == settings:
                 return loaded
         self.close()
-        message = _loading(settings, self.limits, self._bounds)
+        message = loading_message(settings, self.limits, self._bounds)
         self._process = process = start_plugin(self.limits.sandbox, message["folder"])
         line, limit = process.line, max(self.limits.time, LOADING)
         deadline = time.monotonic() + limit
@@ -215,7 +151,7 @@ class Sandbox:
             raise CellFailure("failed", f"its declaration cannot be read: {error}") from None
         process.shared = process.forks and answer.get("shared") is True
         self._loaded = (settings, loaded)
-        self._read = _read(answer)
+        self._read = read_by(answer)
         return loaded
 
     def perform(
@@ -244,7 +180,7 @@ class Sandbox:
             "vehicle": dict(vehicle),
             "period": period,
             "samples": len(selected),
-            "seed": _generator_seed(declaration, selected),
+            "seed": generator_seed(declaration, selected),
         }
         line = process.open_cell(content)
         try:
@@ -292,7 +228,7 @@ class Sandbox:
         content = {
             "vehicle": dict(vehicle),
             "step": float(times[1] - times[0]) if len(times) > 1 else 0.0,
-            "seed": _generator_seed(declaration, observations),
+            "seed": generator_seed(declaration, observations),
         }
         line = process.open_cell(content)
         try:
@@ -333,7 +269,7 @@ class Sandbox:
                     self._fail(line, reply, expected[k * head : (k + 1) * head], deadline)
                 if k < len(observations):
                     replies[k * width : (k + 1) * width] = reply
-            self._read = _read(read_message(lambda length: line.receive(length, deadline)))
+            self._read = read_by(read_message(lambda length: line.receive(length, deadline)))
         except (LateError, EOFError, OSError) as error:
             self._lost(error, self.limits.time)
         except ValueError as error:
@@ -393,7 +329,7 @@ class Sandbox:
             limit = self.limits.memory / 1024**2
             raise CellFailure("failed", f"out of memory (limit {limit:.0f} MiB)", memory=limit)
         reason = one_line(str(answer.get("reason", "")), LONGEST)
-        read = _read(answer) or self._read
+        read = read_by(answer) or self._read
         raise CellFailure("skipped" if status == "skipped" else "failed", reason, read=read)
 
     def _lost(self, error: Exception, limit: float) -> NoReturn:
@@ -409,89 +345,8 @@ class Sandbox:
             process.end(grace=0.0)
         else:
             code = process.end(grace=ENDING)
-        outside = code in _FROM_OUTSIDE
-        raise CellFailure("failed", _last_words(code), read=self._read, outside=outside)
-
-
-def _loading(settings: Settings, limits: Limits, bounds: bool) -> dict[str, Any]:
-    """Return the message that has a plug-in loaded."""
-    source = settings.source
-    folder = ""
-    if source.kind == "file":
-        folder = str(Path(source.target.rpartition(":")[0]).parent)
-    return {
-        "kind": source.kind,
-        "target": source.target,
-        "payload": base64.b64encode(source.payload).decode("ascii"),
-        "variant": settings.variant,
-        "parameters": dict(settings.parameters),
-        "memory": limits.memory,
-        "folder": folder,
-        "path": _places(source.kind, folder),
-        "seed": _digest(b"loading"),
-        "bounds": bounds,
-    }
-
-
-def _places(kind: str, folder: str) -> list[str]:
-    """Return where a plug-in's modules are looked for, after the libraries."""
-    if kind == "file":
-        return [folder]
-    import sys
-
-    return [os.path.abspath(place) for place in sys.path]
-
-
-def _generator_seed(declaration: Declaration, observations: npt.NDArray[Any]) -> str:
-    """Return the seed of the global generators in a cell's process, 32 hexadecimal digits.
-
-    It is a digest of the method's name and of the first sample that the method is given, so it
-    is the same whenever the cell runs, and tells the method nothing that the sample does not. Nine
-    digits of each value count, so that machines that differ in the last one agree.
-    """
-    first = [f"{value:.9g}" for value in observations[:1].view(np.float64).ravel()]
-    return _digest(declaration.name.encode(), *(value.encode() for value in first))
-
-
-def _digest(*parts: bytes) -> str:
-    state = hashlib.blake2b(digest_size=16, person=b"gripbench")
-    for part in parts:
-        state.update(len(part).to_bytes(8, "big"))
-        state.update(part)
-    return state.hexdigest()
-
-
-_FROM_OUTSIDE = tuple(
-    -getattr(signals, name)
-    for name in ("SIGKILL", "SIGTERM", "SIGINT", "SIGHUP")
-    if hasattr(signals, name)
-)
-"""How a process ends that somebody else ended: a user, a scheduler, a system without memory."""
-
-
-def _read(answer: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what a process says that it has read; nothing where it says no such thing."""
-    read = answer.get("read")
-    if not isinstance(read, dict):
-        return {}
-    seen, untracked = read.get("seen"), read.get("untracked")
-    if not isinstance(seen, list) or not isinstance(untracked, list):
-        return {}
-    for item in seen:
-        if not (isinstance(item, list) and len(item) == 3 and {*map(type, item)} == {str}):
-            return {}
-    return {"seen": seen, "untracked": [str(item) for item in untracked]}
-
-
-def _last_words(code: int | None) -> str:
-    if code is None:
-        return "its process closed the connection"
-    if code < 0:
-        try:
-            return f"its process was killed by {signals.Signals(-code).name}"
-        except ValueError:
-            return f"its process was killed by signal {-code}"
-    return f"its process exited with code {code}"
+        outside = code in FROM_OUTSIDE
+        raise CellFailure("failed", last_words(code), read=self._read, outside=outside)
 
 
 def declare(source: Source, variant: str, parameters: dict[str, Any]) -> Declaration:
@@ -511,8 +366,3 @@ def declare(source: Source, variant: str, parameters: dict[str, Any]) -> Declara
         raise InputError(text if place.split(":")[0] in text else f"{place}: {text}") from None
     finally:
         sandbox.close()
-
-
-def end_declaring() -> None:
-    """End what this process keeps to start the processes of plug-ins."""
-    stop_starters()

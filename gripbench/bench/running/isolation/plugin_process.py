@@ -36,20 +36,20 @@ from gripbench.bench.catalogue.declarations import (
     declaration_of,
     describe_error,
 )
-from gripbench.bench.running import audit
-from gripbench.bench.running.confinement import (
-    confine,
-    end_children,
-    end_with,
-    part_from_parent,
-)
 from gripbench.bench.running.execution import (
     Observation,
     SkippedError,
     VehicleOnPaper,
     numbers_of,
 )
-from gripbench.bench.running.messages import (
+from gripbench.bench.running.isolation import audit
+from gripbench.bench.running.isolation.confinement import (
+    confine,
+    end_children,
+    end_with,
+    part_from_parent,
+)
+from gripbench.bench.running.isolation.messages import (
     END,
     ESTIMATES,
     FAILURE,
@@ -57,7 +57,7 @@ from gripbench.bench.running.messages import (
     message_bytes,
     read_message,
 )
-from gripbench.bench.running.trials import Trial, has_batch, perform
+from gripbench.bench.running.isolation.trials import Trial, has_batch, perform
 from gripbench.envs.plants.simulation import Simulation
 from gripbench.envs.signals import record_type
 from gripbench.errors import GripbenchError

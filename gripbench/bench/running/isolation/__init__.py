@@ -1,0 +1,1 @@
+"""Methods that did not ship with gripbench, in confined processes of their own."""
