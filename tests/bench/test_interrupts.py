@@ -9,7 +9,8 @@ import time
 import psutil
 import pytest
 
-from gripbench.bench.catalogue.registry import choose_method, find_scenario
+from gripbench.bench.catalogue.registry import choose_method
+from gripbench.bench.catalogue.scenarios import find_scenario
 from gripbench.bench.running import cells
 from gripbench.bench.running.backends import Backend
 from gripbench.bench.running.deadline import DeadlineError, deadline

@@ -4,7 +4,8 @@ import dataclasses
 
 import pytest
 
-from gripbench.bench.catalogue.registry import choose_method, find_scenario, method_digest
+from gripbench.bench.catalogue.registry import choose_method, method_digest
+from gripbench.bench.catalogue.scenarios import find_scenario
 from gripbench.bench.ranking.ranking import rank
 from gripbench.bench.running import cells, fingerprints
 from gripbench.bench.running.backends import Backend

@@ -5,7 +5,7 @@ import random
 
 import pytest
 
-from gripbench.bench.catalogue.registry import load_suite
+from gripbench.bench.catalogue.suites import load_suite
 from gripbench.configuration import CONFIGS, read_toml
 from gripbench.envs.vehicles import load_vehicle
 from gripbench.envs.worlds import load_scenario

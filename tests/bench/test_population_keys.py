@@ -2,7 +2,8 @@
 
 import pytest
 
-from gripbench.bench.catalogue.registry import find_scenario, load_suite
+from gripbench.bench.catalogue.scenarios import find_scenario
+from gripbench.bench.catalogue.suites import load_suite
 from gripbench.bench.running.fingerprints import scenario_digest
 from gripbench.envs.populations.population import population_files
 from gripbench.envs.worlds import at_level, load_scenario

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from gripbench.bench.catalogue.registry import load_suite
+from gripbench.bench.catalogue.suites import load_suite
 from gripbench.bench.command_line import application
 from gripbench.bench.commands.publish import publish_paper
 from gripbench.bench.publishing import leaderboard

@@ -6,14 +6,9 @@ import pytest
 
 import gripbench
 from gripbench.bench.catalogue import registry
-from gripbench.bench.catalogue.registry import (
-    choose_method,
-    find_scenario,
-    load_suite,
-    method_names,
-    split_choice,
-    suite_files,
-)
+from gripbench.bench.catalogue.registry import choose_method, method_names, split_choice
+from gripbench.bench.catalogue.scenarios import find_scenario
+from gripbench.bench.catalogue.suites import load_suite, suite_files
 from gripbench.configuration import CONFIGS
 from gripbench.errors import InputError
 

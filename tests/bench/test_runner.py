@@ -13,7 +13,8 @@ import psutil
 import pytest
 
 import gripbench
-from gripbench.bench.catalogue.registry import choose_method, find_scenario
+from gripbench.bench.catalogue.registry import choose_method
+from gripbench.bench.catalogue.scenarios import find_scenario
 from gripbench.bench.ranking.summary import scores_csv
 from gripbench.bench.running import runner
 from gripbench.bench.running.backends import Backend, WorkerLostError

@@ -7,7 +7,8 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
-from gripbench.bench.catalogue.registry import choose_method, find_scenario
+from gripbench.bench.catalogue.registry import choose_method
+from gripbench.bench.catalogue.scenarios import find_scenario
 from gripbench.bench.command_line import application
 from gripbench.bench.ranking import sensitivity as study
 from gripbench.envs.worlds import record

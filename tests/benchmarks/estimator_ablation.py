@@ -10,7 +10,7 @@ import sys
 
 import numpy as np
 
-from gripbench.bench.catalogue.registry import find_scenario
+from gripbench.bench.catalogue.scenarios import find_scenario
 from gripbench.envs.worlds import record
 from gripbench.methods.baselines.bicycle_on_paper import BicycleOnPaper
 from gripbench.methods.baselines.constant_friction import ConstantFriction

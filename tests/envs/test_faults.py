@@ -4,7 +4,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from gripbench.bench.catalogue.registry import find_scenario
+from gripbench.bench.catalogue.scenarios import find_scenario
 from gripbench.envs.gym.environment import VehicleEnvironment
 from gripbench.envs.gym.vector_environment import VehicleVectorEnvironment
 from gripbench.envs.instruments.fault_injection import Faults

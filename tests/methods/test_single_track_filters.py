@@ -7,7 +7,7 @@ import pytest
 from filterpy.kalman import KalmanFilter
 from scipy.linalg import expm
 
-from gripbench.bench.catalogue.registry import find_scenario
+from gripbench.bench.catalogue.scenarios import find_scenario
 from gripbench.envs.vehicles import load_vehicle
 from gripbench.envs.worlds import record
 from gripbench.methods.baselines.bicycle_on_paper import steady_sideslip, steady_yaw_rate

@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from gripbench.bench.catalogue.registry import find_scenario
+from gripbench.bench.catalogue.scenarios import find_scenario
 from gripbench.envs.tyres.longitudinal import magic_formula
 from gripbench.envs.vehicles import load_vehicle
 from gripbench.envs.worlds import record

@@ -25,13 +25,8 @@ from gripbench.bench.catalogue.expectations import (
     Perform,
     Subject,
 )
-from gripbench.bench.catalogue.registry import (
-    all_scenario_files,
-    find_method,
-    find_scenario,
-    is_isolated,
-    split_choice,
-)
+from gripbench.bench.catalogue.registry import find_method, is_isolated, split_choice
+from gripbench.bench.catalogue.scenarios import all_scenario_files, find_scenario
 from gripbench.bench.running.execution import missing
 from gripbench.bench.running.isolation.limits import CellFailure, Limits
 from gripbench.bench.running.isolation.loading import Settings

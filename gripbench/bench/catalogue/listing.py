@@ -5,15 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from gripbench.bench.catalogue.registry import (
-    all_scenario_files,
-    built_in_methods,
-    choose_method,
-    find_scenario,
-    load_suite,
-    method_names,
-    suite_files,
-)
+from gripbench.bench.catalogue.registry import built_in_methods, choose_method, method_names
+from gripbench.bench.catalogue.scenarios import all_scenario_files, find_scenario
+from gripbench.bench.catalogue.suites import load_suite, suite_files
 from gripbench.bench.ranking.summary import MARK, marked
 from gripbench.bench.running.recorded_scenarios import PREFIX
 from gripbench.configuration import read_toml

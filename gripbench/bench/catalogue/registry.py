@@ -1,9 +1,7 @@
-"""Where methods, scenarios and suites come from.
+"""The name, file or class of a method in; where it comes from and what it declares out.
 
 A method is known by name (built in, registered by decorator, or an entry point of the group
-`gripbench.methods`) or by file (`path/to/file.py:Class`). A scenario is known by name (built in,
-or an entry point of the group `gripbench.scenarios` that gives the path of a TOML file or a
-folder of them) or by the path of a TOML file. A suite is a TOML file that names both.
+`gripbench.methods`) or by file (`path/to/file.py:Class`).
 """
 
 from __future__ import annotations
@@ -16,7 +14,7 @@ import inspect
 import pkgutil
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -26,24 +24,14 @@ from pydantic import Field
 
 from gripbench import methods as built_in
 from gripbench.bench.catalogue.declarations import Declaration, Source, declaration_of
-from gripbench.configuration import CONFIGS, Configuration, named_file, parse, read_toml
-from gripbench.envs.instruments.faults import split_faults
-from gripbench.envs.scenarios import LEVELS, Scenario
-from gripbench.envs.worlds import (
-    at_level,
-    load_scenario,
-    scenario_files,
-    split_level,
-    with_faults,
-)
+from gripbench.configuration import Configuration, parse, read_toml
 from gripbench.errors import InputError, unknown
-from gripbench.extensions import entry_points, load
+from gripbench.extensions import entry_points
 from gripbench.methods.contract import CompiledMethod
 from gripbench.methods.settings import Setting
 from gripbench.sources import digest, source_digest
 
 METHOD_GROUP = "gripbench.methods"
-SCENARIO_GROUP = "gripbench.scenarios"
 
 _registered: dict[str, Any] = {}
 
@@ -337,117 +325,3 @@ def method_digest(source: Source, declaration: Declaration) -> str:
         code = digest(code, repr(source.payload))
     settings = sorted(declaration.settings.items())
     return digest(code, source.target.rpartition(":")[2], declaration.variant, repr(settings))
-
-
-class SuiteMethod(Configuration):
-    """A method of a suite with its settings."""
-
-    name: str
-    variant: str = ""
-    parameters: dict[str, float | str | bool] = Field(default_factory=dict)
-
-
-class Suite(Configuration):
-    """A named choice of scenarios, methods and seeds.
-
-    Attributes
-    ----------
-    name
-        Unique name; the file has the same.
-    description
-        One sentence.
-    scenarios
-        Names or paths of scenario files.
-    methods
-        `name[:variant]`, or a table with `name`, `variant` and `parameters`.
-    seeds
-        Number of seeds, from 0.
-    targets
-        Signals that tables show; empty: all that are estimated.
-    level
-        Level of the scenarios' populations; a recording has none.
-    """
-
-    name: str
-    description: str
-    scenarios: tuple[str, ...] = Field(min_length=1)
-    methods: tuple[str | SuiteMethod, ...] = Field(min_length=1)
-    seeds: int = Field(default=100, ge=1)
-    targets: tuple[str, ...] = ()
-    level: int = Field(default=0, ge=0, le=LEVELS[-1])
-
-    def names(self, level: int | None = None) -> list[str]:
-        """Return the names of its scenarios at a level, its own unless one is given."""
-        chosen = self.level if level is None else level
-        return [
-            f"{name}@{chosen}" if chosen and "@" not in name and ":" not in name else name
-            for name in self.scenarios
-        ]
-
-    def specs(self) -> list[MethodSpec]:
-        """Return its methods, ready to run."""
-        return [
-            choose_method(item)
-            if isinstance(item, str)
-            else choose_method(item.name, item.variant, item.parameters)
-            for item in self.methods
-        ]
-
-
-def suite_files() -> dict[str, Path]:
-    """Return the suites that ship with gripbench, by name."""
-    return {path.stem: path for path in sorted((CONFIGS / "suites").glob("*.toml"))}
-
-
-def load_suite(name: str) -> Suite:
-    """Return a suite by name or by the path of a TOML file.
-
-    Raises
-    ------
-    InputError
-        If there is no such suite or its file has a mistake.
-    """
-    path = named_file("suite", name, suite_files())
-    return parse(Suite, read_toml(path), path)
-
-
-def all_scenario_files() -> dict[str, Path]:
-    """Return the scenario files by name: those that ship and those of installed packages."""
-    return dict(_plugged_scenarios()) | scenario_files()
-
-
-def find_scenario(name: str) -> Scenario:
-    """Return a scenario by name, by the path of a TOML file, or as `recording:NAME`.
-
-    `NAME@LEVEL` is the scenario at a level of its population, `NAME+FAULT:SEVERITY` one with a
-    fault of its instruments.
-
-    Raises
-    ------
-    InputError
-        If there is no such scenario; the message names the nearest one.
-    """
-    if name.startswith("recording:"):
-        from gripbench.bench.running.recorded_scenarios import recorded_scenario  # reads the log
-
-        return recorded_scenario(name)
-    plain, faults = split_faults(name)
-    if faults:
-        return with_faults(find_scenario(plain), faults)
-    files = all_scenario_files()
-    place, level = split_level(name)
-    if not place.endswith(".toml"):
-        if place not in files:
-            raise unknown("scenario", name, files)
-        place = str(files[place])
-    return at_level(load_scenario(place), level)
-
-
-def _plugged_scenarios() -> Iterator[tuple[str, Path]]:
-    for name, point in entry_points(SCENARIO_GROUP).items():
-        given = load(point)
-        place = Path(given() if isinstance(given, Callable) else given)  # type: ignore[arg-type]
-        if place.is_dir():
-            yield from ((path.stem, path) for path in sorted(place.glob("*.toml")))
-        else:
-            yield name, place

@@ -49,7 +49,7 @@ def publish(
     """
     import joblib
 
-    from gripbench.bench.catalogue.registry import load_suite, suite_files
+    from gripbench.bench.catalogue.suites import load_suite, suite_files
     from gripbench.bench.papers.claims import paper_files
     from gripbench.bench.publishing.dataset import write_dataset
     from gripbench.bench.publishing.leaderboard import build, write

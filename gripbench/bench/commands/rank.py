@@ -85,7 +85,7 @@ def rank(
 
 def check_names(results: Path, given: list[str], stored: set[str]) -> None:
     """Raise InputError for a scenario that has no stored rows, or that nobody knows."""
-    from gripbench.bench.catalogue.registry import all_scenario_files
+    from gripbench.bench.catalogue.scenarios import all_scenario_files
     from gripbench.errors import InputError, unknown
 
     for name in given:

@@ -98,7 +98,7 @@ def run(
     ] = None,
 ) -> None:
     """Run methods on scenarios and print their RMS errors; what is stored is not run again."""
-    from gripbench.bench.catalogue.registry import load_suite
+    from gripbench.bench.catalogue.suites import load_suite
     from gripbench.bench.publishing.degradation_table import print_degradation
     from gripbench.bench.publishing.presentation import (
         console,

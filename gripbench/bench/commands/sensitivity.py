@@ -43,7 +43,9 @@ def sensitivity(
     results: Annotated[Path, typer.Option(help="Folder of results.")] = DEFAULT_RESULTS,
 ) -> None:
     """Let one cause at a time leave its value on paper: RMS at its ends, and breaking points."""
-    from gripbench.bench.catalogue.registry import choose_method, find_scenario, load_suite
+    from gripbench.bench.catalogue.registry import choose_method
+    from gripbench.bench.catalogue.scenarios import find_scenario
+    from gripbench.bench.catalogue.suites import load_suite
     from gripbench.bench.publishing.figures.style import save, style
     from gripbench.bench.publishing.figures.tornado import tornado
     from gripbench.bench.publishing.presentation import console

@@ -17,7 +17,7 @@ import pandas as pd
 from pydantic import Field
 
 import gripbench
-from gripbench.bench.catalogue.registry import load_suite, suite_files
+from gripbench.bench.catalogue.suites import load_suite, suite_files
 from gripbench.bench.publishing.board_tables import Timings, answer_table, board_table
 from gripbench.bench.publishing.columns import Table
 from gripbench.bench.publishing.tables import markdown

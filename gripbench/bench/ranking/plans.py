@@ -9,7 +9,8 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
-from gripbench.bench.catalogue.registry import find_scenario, load_suite, suite_files
+from gripbench.bench.catalogue.scenarios import find_scenario
+from gripbench.bench.catalogue.suites import load_suite, suite_files
 from gripbench.bench.running.recorded_scenarios import PREFIX
 from gripbench.errors import GripbenchError
 

@@ -8,13 +8,9 @@ from typing import Any
 
 import pandas as pd
 
-from gripbench.bench.catalogue.registry import (
-    MethodSpec,
-    built_in_methods,
-    choose_method,
-    find_scenario,
-    load_suite,
-)
+from gripbench.bench.catalogue.registry import MethodSpec, built_in_methods, choose_method
+from gripbench.bench.catalogue.scenarios import find_scenario
+from gripbench.bench.catalogue.suites import load_suite
 from gripbench.bench.running.backends import Backend
 from gripbench.bench.running.execution import missing
 from gripbench.bench.running.isolation.limits import Limits

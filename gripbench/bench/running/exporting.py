@@ -21,7 +21,8 @@ import numpy.typing as npt
 import pandas as pd
 from pydantic import Field
 
-from gripbench.bench.catalogue.registry import find_scenario, load_suite
+from gripbench.bench.catalogue.scenarios import find_scenario
+from gripbench.bench.catalogue.suites import load_suite
 from gripbench.bench.running.fingerprints import world_digest
 from gripbench.bench.running.recorded_scenarios import PREFIX, RecordedScenario, recording_of
 from gripbench.configuration import Configuration, parse

@@ -6,7 +6,8 @@ import contextlib
 from collections.abc import Iterable
 from pathlib import Path
 
-from gripbench.bench.catalogue.registry import all_scenario_files, method_names
+from gripbench.bench.catalogue.registry import method_names
+from gripbench.bench.catalogue.scenarios import all_scenario_files
 from gripbench.bench.running.recorded_scenarios import PREFIX
 from gripbench.bench.running.store import DamagedRowError, Store, leftovers, read_row
 from gripbench.errors import InputError

@@ -18,7 +18,8 @@ import numpy as np
 import numpy.typing as npt
 
 from gripbench.bench.catalogue.declarations import Declaration, declaration_from
-from gripbench.bench.catalogue.registry import find_scenario, method_names
+from gripbench.bench.catalogue.registry import method_names
+from gripbench.bench.catalogue.scenarios import find_scenario
 from gripbench.bench.running.execution import missing
 from gripbench.bench.running.exporting import FORMATS, Drive, digest_of_samples, read_records
 from gripbench.bench.running.fingerprints import versions, world_digest

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy.typing as npt
 
-from gripbench.bench.catalogue.registry import MethodSpec, choose_method, find_scenario
+from gripbench.bench.catalogue.registry import MethodSpec, choose_method
+from gripbench.bench.catalogue.scenarios import find_scenario
 from gripbench.bench.running.execution import execute, missing
 from gripbench.bench.running.recorded_scenarios import on_recording, recording_of
 from gripbench.envs.recordings import Recording

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from gripbench.bench.catalogue.registry import load_suite, suite_files
+from gripbench.bench.catalogue.suites import load_suite, suite_files
 from gripbench.bench.papers.claims import paper_files
 from gripbench.bench.publishing.board_tables import board_table
 from gripbench.bench.publishing.columns import Column, Table

@@ -11,7 +11,7 @@ import joblib
 import numpy as np
 import numpy.typing as npt
 
-from gripbench.bench.catalogue.registry import find_scenario
+from gripbench.bench.catalogue.scenarios import find_scenario
 from gripbench.bench.publishing.figures.runs import Runs
 from gripbench.bench.publishing.figures.style import axis_scale
 from gripbench.bench.scoring.scoring import on_branch
