@@ -37,23 +37,18 @@ from gripbench.envs.vehicles import VEHICLE_PARAMETERS, load_vehicle
 from gripbench.errors import GripbenchError, InputError, unknown
 from gripbench.logs.map_tables import (
     DATETIME,
-    Attitude,
     Bound,
-    Brake,
     Column,
     Databases,
     Delimiter,
     Derived,
-    Drive,
-    Geodetic,
-    Level,
     LogFile,
     Name,
-    Sensor,
     TimeColumn,
     Windows,
     convertible,
 )
+from gripbench.logs.vehicle_tables import Attitude, Brake, Drive, Geodetic, Level, Sensor
 
 __all__ = [
     "DATETIME", "Bound", "ChannelMap", "Column", "Derived", "LogFile", "TimeColumn",

@@ -15,8 +15,8 @@ import numpy as np
 from gripbench.envs.vehicles import GRAVITY
 from gripbench.errors import InputError
 from gripbench.logs.derivation import slope
-from gripbench.logs.map_tables import Level, Sensor
 from gripbench.logs.series import Floats, Series, wrapped
+from gripbench.logs.vehicle_tables import Level, Sensor
 
 _VECTORS = (
     ("accel_x", "accel_y", "accel_z"),

@@ -13,8 +13,9 @@ import numpy as np
 from gripbench.errors import InputError
 from gripbench.logs.channel_map import ChannelMap
 from gripbench.logs.log import optional
-from gripbench.logs.map_tables import Brake, Column, Drive
+from gripbench.logs.map_tables import Column
 from gripbench.logs.series import Floats, Series, wrapped
+from gripbench.logs.vehicle_tables import Brake, Drive
 
 Reader = Callable[[str, str, Column, str], Series]
 """Reads a column: signal's name, key, column, unit that it comes out in."""
