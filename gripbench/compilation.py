@@ -6,7 +6,8 @@ they are and numba out, which is most of what such a command would take.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from types import CodeType, FunctionType
 from typing import Any
 
 _declare_only = False
@@ -34,3 +35,49 @@ def _njit(function: Callable[..., Any], **options: Any) -> Any:
     import numba  # .4 s
 
     return numba.njit(error_model="numpy", **options)(function)
+
+
+def replacing(function: Any, others: Mapping[Any, Any], name: str) -> Any:
+    """Return a compiled function that calls others in place of some, at any depth.
+
+    Parameters
+    ----------
+    function
+        Compiled function.
+    others
+        By compiled function that it or what it calls has as a global: what is called instead.
+    name
+        Unique name of the choice; compiled code is kept under it.
+    """
+    if _declare_only or not others:
+        return function
+    files = tuple(sorted({other.py_func.__code__.co_filename for other in others.values()}))
+    made = dict(others)
+
+    def with_others(one: Any) -> Any:
+        if one not in made:
+            plain = one.py_func
+            called = {
+                key: plain.__globals__[key]
+                for key in _names(plain.__code__)
+                if hasattr(plain.__globals__.get(key), "py_func")
+            }
+            changed = {key: with_others(value) for key, value in called.items()}
+            made[one] = one
+            if changed != called:
+                copy = FunctionType(plain.__code__, plain.__globals__ | changed, plain.__name__)
+                copy.__defaults__, copy.__doc__ = plain.__defaults__, plain.__doc__
+                copy.__qualname__ = f"{name}.{plain.__qualname__}"
+                copy.rests_on = files  # type: ignore[attr-defined]
+                always = one.targetoptions.get("inline") == "always"
+                made[one] = inlined(copy) if always else compiled(copy)
+        return made[one]
+
+    return with_others(function)
+
+
+def _names(code: CodeType) -> Iterator[str]:
+    yield from code.co_names
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _names(constant)

@@ -24,13 +24,15 @@ from gripbench.errors import InputError
 from gripbench.sources import imports_gripbench, in_project, source_digest
 
 
-def _stamp(path: str) -> str:
-    return _stamp_of_project(path) if in_project(Path(path)) else source_digest(Path(path))
+def _stamp(*paths: str) -> str:
+    if all(in_project(Path(path)) for path in paths):
+        return _stamp_of_project(*paths)
+    return source_digest(*map(Path, paths))
 
 
 @cache
-def _stamp_of_project(path: str) -> str:
-    return source_digest(Path(path))
+def _stamp_of_project(*paths: str) -> str:
+    return source_digest(*map(Path, paths))
 
 
 def _concerned(path: str) -> bool:
@@ -41,17 +43,21 @@ class _Stamped:
     """Mixed into numba's locators: only for files of this project or that use it."""
 
     _py_file: str
+    _others: tuple[str, ...] = ()
 
     def get_source_stamp(self) -> str:
         """Return the digest of the file with everything that it rests on."""
-        return _stamp(self._py_file)
+        return _stamp(self._py_file, *self._others)
 
     @classmethod
     def from_function(cls, py_func: Any, py_file: str) -> Any:
         """Return a locator, or None to leave the function to numba's own."""
         if not _concerned(py_file):
             return None
-        return super().from_function(py_func, py_file)  # type: ignore[misc]
+        found = super().from_function(py_func, py_file)  # type: ignore[misc]
+        if found is not None:
+            found._others = getattr(py_func, "rests_on", ())  # see `compilation.replacing`
+        return found
 
 
 class InGivenFolder(_Stamped, UserProvidedCacheLocator):

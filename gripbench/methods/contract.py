@@ -19,19 +19,22 @@ A plain class with `reset(vehicle, dt)` and `update(obs) -> dict`, and the attri
 
 from __future__ import annotations
 
+import inspect
+import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
 
-from gripbench.compilation import compiled
+from gripbench.compilation import compiled, replacing
 from gripbench.envs.signals import VARIANCE, record_type, signal
 from gripbench.envs.vehicles import require
 from gripbench.errors import InputError, UndeclaredChannelError, unknown
 from gripbench.methods import drivers
-from gripbench.methods.settings import Parameter, Setting, Variant, checked_settings
+from gripbench.methods.settings import Parameter, Setting, Variant, Variants, checked_settings
 
 
 @runtime_checkable
@@ -84,6 +87,9 @@ class CompiledMethod:
         Its own parameters.
     variants
         What differs in each variant, by name: a `Variant`, or only its settings.
+    printed
+        Module with the forms that its paper prints and gripbench corrects, see
+        `gripbench.methods.printed`; empty: none.
     baseline
         Whether it is a trivial estimator that others are measured against.
     files
@@ -105,7 +111,8 @@ class CompiledMethod:
     vehicle_parameters: tuple[str, ...] = ()
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     variants: ClassVar[Mapping[str, Any]] = {}
-    files: ClassVar[tuple[str, ...]] = ()
+    printed: ClassVar[str] = ""
+    files: tuple[str, ...] = ()
     baseline: ClassVar[bool] = False
     state: ClassVar[np.dtype[Any]]
     step: Callable[..., Any]
@@ -113,10 +120,9 @@ class CompiledMethod:
 
     def __init_subclass__(cls, **arguments: Any) -> None:
         super().__init_subclass__(**arguments)
-        cls.variants = {
-            name: given if isinstance(given, Variant) else Variant(given)
-            for name, given in cls.variants.items()
-        }
+        if not isinstance(cls.variants, Variants) or "printed" in vars(cls):
+            printed = vars(cls).get("printed", "")
+            cls.variants = Variants(getattr(cls, "name", ""), cls.variants, printed)
 
     def __init__(self, variant: str = "corrected", **overrides: Setting) -> None:
         if variant != "corrected" and variant not in self.variants:
@@ -129,6 +135,9 @@ class CompiledMethod:
         if chosen.vehicle_parameters is not None:
             self.vehicle_parameters = chosen.vehicle_parameters
         self.step = chosen.step or type(self).step
+        if chosen.functions:
+            self.step = replacing(self.step, chosen.functions, f"{self.name}.{variant}")
+            self.files = (*self.files, *_files_of(type(self), chosen))
         self.record_types = _record_types(self)
         self._records: drivers.Records | None = None
 
@@ -199,6 +208,13 @@ class RecordTypes:
     obs: np.dtype[Any]
     params: np.dtype[Any]
     est: np.dtype[Any]
+
+
+def _files_of(method: type[CompiledMethod], variant: Variant) -> set[str]:
+    """Return the files of a variant's functions, relative to the method's own."""
+    own = os.path.dirname(inspect.getfile(method))
+    plain = (getattr(each, "py_func", each) for each in variant.functions.values())
+    return {Path(os.path.relpath(inspect.getfile(each), own)).as_posix() for each in plain}
 
 
 def _record_types(method: CompiledMethod) -> RecordTypes:

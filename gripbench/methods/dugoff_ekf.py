@@ -5,20 +5,20 @@ speeds and the accelerations (for the wheel loads); longitudinal speed and yaw r
 come sideslip (eq. 17), tyre forces and the used friction of each wheel (eq. 16): what the wheel
 draws from the road, not what the road has to offer.
 
-Errata, corrected by default; the parameter in brackets restores the printed form, `paper` all:
+Errata, corrected here; `gripbench.methods.printed.dakhlallah2008` has the printed forms:
 
 - (1): psi is the yaw rate in the first two rows, its derivative in the third; the tyre forces of
   the front axle turn with the steering angle.
-- (2), (4): 1 - |lambda| (`printed_slip`).
+- (2), (4): 1 - |lambda|.
 - (5): lambda compares the rolling speed with the speed in the plane of the wheel.
 - (6): S_b is the full track. The text calls the 1.5 m of its table an axle length; read as half
   of that (`load_transfer_track` 0.5), the transfer doubles.
-- (11): F is the Jacobian of f + g; that of f alone lacks the tyres (`printed_jacobian`).
-- (12): the correction starts from the forecast x(k|k-1), printed is x(k-1|k-1) twice
-  (`printed_update`); H is the Jacobian of h, not of f.
+- (11): F is the Jacobian of f + g; that of f alone lacks the tyres.
+- (12): the correction starts from the forecast x(k|k-1), printed is x(k-1|k-1) twice; H is the
+  Jacobian of h, not of f.
 
 One improvement on the paper: the prediction takes the midpoint rule over the mean of two samples'
-inputs instead of forward Euler on the older ones (`printed_step`).
+inputs instead of forward Euler on the older ones.
 
 The output v_x is a measurement of this filter, though none of the sensors that the paper lists
 gives it; here it is the channel of an optical speed sensor.
@@ -65,10 +65,6 @@ DUGOFF_PARAMETERS = (
     Parameter("lowest_speed", 2.0, "m/s", "Speed below which the slips are held at it", 0.1),
     Parameter("correction", True, "-", "Measurements correct the model; else it runs open loop"),
     Parameter("load_transfer_track", 1.0, "-", "Share of the track in eq. 6", 0.1, 2.0),
-    Parameter("printed_step", False, "-", "Forward Euler step"),
-    Parameter("printed_slip", False, "-", "1 - lambda in eq. 2 and 4"),
-    Parameter("printed_jacobian", False, "-", "F of eq. 11 without the tyres"),
-    Parameter("printed_update", False, "-", "Eq. 12 from x(k-1|k-1)"),
 )
 
 
@@ -109,9 +105,7 @@ def evaluate(state, params):
         moving = 1.0 if along > params.lowest_speed else 0.0
         along = max(along, params.lowest_speed)
         rolling = max(state.rolling[i], 0.05 * along)  # a locked wheel has no finite slip
-        slip_x, slip_y, d_along, d_mixed, d_across = dugoff_slips(
-            rolling, along, across, params.printed_slip
-        )
+        slip_x, slip_y, d_along, d_mixed, d_across = dugoff_slips(rolling, along, across)
         force_x, force_y, xx, xy, yy = dugoff_force(
             stiffness_x * slip_x, stiffness_y * slip_y, params.friction * load
         )
@@ -153,33 +147,37 @@ def _read_inputs(state, obs, params, share):
 
 
 @compiled
-def _predict(state, obs, params):
-    """Advance states and covariance to a sample (eq. 11) from the model's last evaluation."""
-    elapsed = obs.time - state.time
-    filter = state.filter
-    x = filter.x
+def transition(state, elapsed):
+    """Write the transition matrix of eq. 11 from the model's last evaluation."""
     for i in range(3):
         for j in range(3):
-            filter.F[i, j] = (1.0 if i == j else 0.0) + elapsed * state.slope[i, j]
-    if params.printed_jacobian > 0.0:
-        filter.F[0, 0], filter.F[0, 1], filter.F[0, 2] = 1.0, elapsed * x[2], elapsed * x[1]
-        filter.F[1, 0], filter.F[1, 1], filter.F[1, 2] = -elapsed * x[2], 1.0, -elapsed * x[0]
-        filter.F[2, 0], filter.F[2, 1], filter.F[2, 2] = 0.0, 0.0, 1.0
+            state.filter.F[i, j] = (1.0 if i == j else 0.0) + elapsed * state.slope[i, j]
+
+
+@compiled
+def advance(state, obs, params, elapsed):
+    """Advance the states to a sample by the midpoint rule, eq. 11."""
+    x = state.filter.x
+    speed_x, speed_y, yaw_rate = x[0], x[1], x[2]
+    for i in range(3):
+        x[i] += 0.5 * elapsed * state.rate[i]
+    _read_inputs(state, obs, params, 0.5)
+    evaluate(state, params)
+    x[0] = speed_x + elapsed * state.rate[0]
+    x[1] = speed_y + elapsed * state.rate[1]
+    x[2] = yaw_rate + elapsed * state.rate[2]
+
+
+@compiled
+def _predict(state, obs, params):
+    elapsed = obs.time - state.time
+    filter = state.filter
+    transition(state, elapsed)
     filter.Q[0, 0] = params.speed_x_walk * elapsed
     filter.Q[1, 1] = params.speed_y_walk * elapsed
     filter.Q[2, 2] = params.yaw_rate_walk * elapsed
     predict_covariance(filter)
-    if params.printed_update > 0.0 and params.correction > 0.0:
-        return
-    speed_x, speed_y, yaw_rate = x[0], x[1], x[2]
-    if params.printed_step == 0.0:
-        for i in range(3):
-            x[i] += 0.5 * elapsed * state.rate[i]
-        _read_inputs(state, obs, params, 0.5)
-        evaluate(state, params)
-    x[0] = speed_x + elapsed * state.rate[0]
-    x[1] = speed_y + elapsed * state.rate[1]
-    x[2] = yaw_rate + elapsed * state.rate[2]
+    advance(state, obs, params, elapsed)
 
 
 @compiled
@@ -289,20 +287,7 @@ class DugoffEkf(CompiledMethod):
         "cornering_stiffness_rear",
     )
     parameters = DUGOFF_PARAMETERS
-    variants = {
-        "paper": {
-            "printed_step": True,
-            "load_transfer_track": 0.5,
-            "printed_slip": True,
-            "printed_jacobian": True,
-            "printed_update": True,
-        },
-        "paper_step": {"printed_step": True},
-        "paper_slip": {"printed_slip": True},
-        "paper_load_transfer": {"load_transfer_track": 0.5},
-        "paper_jacobian": {"printed_jacobian": True},
-        "paper_update": {"printed_update": True},
-        "open_loop": {"correction": False},
-    }
+    variants = {"open_loop": {"correction": False}}
+    printed = "gripbench.methods.printed.dakhlallah2008"
     state = DUGOFF_STATE
     step = staticmethod(_step)

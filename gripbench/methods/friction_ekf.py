@@ -4,7 +4,7 @@ An extended Kalman filter over the friction coefficient alone. Slip angles follo
 angle (eq. 14), the brush tyre gives the lateral forces (eq. 15), and their sum is compared with
 the measured lateral acceleration (eq. 16).
 
-Errata corrected by default (`printed_15` and `printed_16` restore them one by one):
+Errata, corrected here; `gripbench.methods.printed.yoon2015` has the printed forms:
 
 - (15): the condition is on the magnitude of the slip angle; as printed the force keeps growing
   for a large negative one, to -2 mu F_z at theta sigma = -2. Only the product c_p l^2 enters, so
@@ -48,8 +48,6 @@ FRICTION_PARAMETERS = (
         "1.03 m/s^2 a sample at 166 Hz",
         1e-9, 100.0,
     ),
-    Parameter("printed_15", False, "-", "Slide for positive slip angles only"),
-    Parameter("printed_16", False, "-", "Compare with the accelerometer's reading"),
     Parameter("least_slope", 0.3, "m/s^2", "Least |d a_y / d mu| of an update", 0.0, 100.0),
     Parameter("least_accel", 0.8, "m/s^2", "Least |a_y| of an update", 0.0, 100.0),
     Parameter("least_speed", 2.0, "m/s", "Least speed of an update", 0.1, 100.0),
@@ -59,7 +57,13 @@ _LEAST_MU, _LARGEST_MU = 0.03, 1.2
 
 
 @compiled
-def brush_force(slip_angle, mu, load, stiffness, printed):
+def slides(share):
+    """Return whether a tyre slides, eq. 15, at this theta sigma: 1 where sliding begins."""
+    return abs(share) > 1.0
+
+
+@compiled
+def brush_force(slip_angle, mu, load, stiffness):
     """Return the lateral force of a brush tyre, eq. 15, and its derivative to the friction.
 
     Parameters
@@ -72,21 +76,35 @@ def brush_force(slip_angle, mu, load, stiffness, printed):
         Vertical load [N].
     stiffness
         Force over slip angle at zero slip, 2 c_p l^2 for a tyre [N/rad].
-    printed
-        Nonzero: slide only for positive slip angles, as the condition is printed.
 
     Returns
     -------
     Force [N] and its derivative [N].
     """
     slip = np.tan(slip_angle)
-    share = stiffness * slip / (3.0 * mu * load)  # theta_y sigma_y: 1 where the tyre slides
-    size = abs(share)
-    if size > 1.0 and not (printed and share < 0.0):
+    share = stiffness * slip / (3.0 * mu * load)  # theta_y sigma_y
+    if slides(share):
         sign = 1.0 if share > 0.0 else -1.0
         return sign * mu * load, sign * load
+    size = abs(share)
     force = stiffness * slip * (1.0 - size + size * size / 3.0)
     return force, stiffness * slip / mu * size * (1.0 - 2.0 / 3.0 * size)
+
+
+@compiled
+def acceleration_of_forces(reading, level, bias):
+    """Return the acceleration that the tyre forces cause [m/s^2], the measurement of eq. 16.
+
+    Parameters
+    ----------
+    reading
+        The lateral accelerometer's reading [m/s^2].
+    level
+        The same without gravity's component by roll [m/s^2].
+    bias
+        The accelerometer's bias [m/s^2].
+    """
+    return level - bias
 
 
 @compiled
@@ -94,15 +112,12 @@ def lateral_acceleration(mu, slip_front, slip_rear, steer, params):
     """Return the lateral acceleration of eq. 16 [m/s^2] and its derivative to the friction."""
     wheelbase = params.cg_to_front + params.cg_to_rear
     weight = params.mass * GRAVITY
-    printed = params.printed_15 > 0.0
     front, front_slope = brush_force(
-        slip_front, mu, weight * params.cg_to_rear / wheelbase,
-        params.cornering_stiffness_front, printed,
-    )  # fmt: skip
+        slip_front, mu, weight * params.cg_to_rear / wheelbase, params.cornering_stiffness_front
+    )
     rear, rear_slope = brush_force(
-        slip_rear, mu, weight * params.cg_to_front / wheelbase,
-        params.cornering_stiffness_rear, printed,
-    )  # fmt: skip
+        slip_rear, mu, weight * params.cg_to_front / wheelbase, params.cornering_stiffness_rear
+    )
     turn = np.cos(steer)
     return (front * turn + rear) / params.mass, (front_slope * turn + rear_slope) / params.mass
 

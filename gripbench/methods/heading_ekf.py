@@ -4,7 +4,7 @@ An extended Kalman filter over yaw and roll. The gyroscopes drive it (eq. 7), th
 seen by the magnetometer corrects it (eq. 6), and a measurement whose Mahalanobis distance is
 improbable is rejected (eq. 4): a passing lorry must not turn the heading.
 
-Errata corrected by default (`printed_4`, `printed_6` and `printed_7` restore them one by one):
+Errata, corrected here; `gripbench.methods.printed.yoon2015` has the printed forms:
 
 - (4): the chi-square threshold applies to the squared distance of the innovation.
 - (5): the third column is (-sin theta, cos theta sin phi, cos theta cos phi).
@@ -101,9 +101,6 @@ HEADING_PARAMETERS = (
         "accelerometer_roll_std", 0.0, "rad sqrt(s)",
         "Noise density of the roll from the lateral accelerometer; 0: not used", 0.0, 100.0,
     ),
-    Parameter("printed_4", False, "-", "The threshold is on the distance itself"),
-    Parameter("printed_6", False, "-", "m_z as eq. 6 prints it"),
-    Parameter("printed_7", False, "-", "Rates of the angles as eq. 7 prints them"),
 )  # fmt: skip
 
 PITCH_AWARE = {
@@ -122,9 +119,6 @@ TABLE_1_NOISE = {
 }
 """The noise of Table 1 and neither of the two additions."""
 
-PRINTED_HEADING = TABLE_1_NOISE | {"printed_4": True, "printed_6": True, "printed_7": True}
-"""The same with the equations as printed."""
-
 NO_ROLL_MODEL = {"roll_model": False, "roll_time": 2.0, "roll_std": 1.5 * _DEGREE}
 """Roll around zero, without the springs."""
 
@@ -133,7 +127,13 @@ UNGATED = 1e300
 
 
 @compiled
-def field_in_vehicle(yaw, roll, pitch, horizontal, up, printed):
+def west_in_z(north, west, roll):
+    """Return the first term of m_z, eq. 6 [T], and its slopes over yaw and roll [T/rad]."""
+    return west * np.sin(roll), north * np.sin(roll), west * np.cos(roll)
+
+
+@compiled
+def field_in_vehicle(yaw, roll, pitch, horizontal, up):
     """Return the Earth's field in vehicle axes, eq. 5 (eq. 6 at zero pitch).
 
     Parameters
@@ -142,8 +142,6 @@ def field_in_vehicle(yaw, roll, pitch, horizontal, up, printed):
         Attitude against magnetic north [rad], ZYX Euler angles.
     horizontal, up
         Field towards magnetic north and upwards [T].
-    printed
-        Nonzero: the first term of m_z as eq. 6 prints it.
 
     Returns
     -------
@@ -154,8 +152,26 @@ def field_in_vehicle(yaw, roll, pitch, horizontal, up, printed):
     lifted = north * np.sin(pitch) + up * np.cos(pitch)
     x = north * np.cos(pitch) - up * np.sin(pitch)
     y = -west * np.cos(roll) + lifted * np.sin(roll)
-    z = west * (np.cos(roll) if printed else np.sin(roll)) + lifted * np.cos(roll)
+    z = west_in_z(north, west, roll)[0] + lifted * np.cos(roll)
     return x, y, z
+
+
+@compiled
+def yaw_speed(yaw_rate, roll):
+    """Return psi' of eq. 7 [rad/s] from the yaw rate [rad/s] and the roll [rad]."""
+    return yaw_rate / np.cos(roll)
+
+
+@compiled
+def roll_speed(roll_rate, turning, pitch):
+    """Return phi' of eq. 7 [rad/s] from the roll rate [rad/s], psi' [rad/s] and pitch [rad]."""
+    return roll_rate + turning * np.sin(pitch)
+
+
+@compiled
+def yaw_by_roll(elapsed, turning, roll):
+    """Return the slope of the yaw over the roll that eq. 7 gives over `elapsed` [s]."""
+    return elapsed * turning * np.tan(roll)
 
 
 @compiled
@@ -178,14 +194,13 @@ def heading_predict(heading, yaw_rate, roll_rate, accel_y, elapsed, params):
     f = heading.filter
     decay = np.exp(-elapsed / params.roll_time)
     roll = f.x[1]
-    printed = params.printed_7 > 0.0
-    yaw_speed = yaw_rate if printed else yaw_rate / np.cos(roll)
-    roll_speed = roll_rate if printed else roll_rate + yaw_speed * np.sin(heading.pitch)
-    f.x[0] += yaw_speed * elapsed
+    turning = yaw_speed(yaw_rate, roll)
+    f.x[0] += turning * elapsed
     sprung = params.roll_model * params.roll_gradient * accel_y
-    f.x[1] = sprung + decay * (roll - sprung) + roll_speed * elapsed
+    rolling = roll_speed(roll_rate, turning, heading.pitch)
+    f.x[1] = sprung + decay * (roll - sprung) + rolling * elapsed
     f.F[0, 0] = 1.0
-    f.F[0, 1] = 0.0 if printed else elapsed * yaw_speed * np.tan(roll)
+    f.F[0, 1] = yaw_by_roll(elapsed, turning, roll)
     f.F[1, 0] = 0.0
     f.F[1, 1] = decay
     f.Q[0, 0] = params.yaw_walk**2 * elapsed
@@ -195,14 +210,19 @@ def heading_predict(heading, yaw_rate, roll_rate, accel_y, elapsed, params):
 
 
 @compiled
+def is_probable(distance, gate):
+    """Return whether a squared Mahalanobis distance is within the gate, eq. 4."""
+    return distance <= gate
+
+
+@compiled
 def heading_update_field(heading, x, y, z, params):
     """Take a magnetometer measurement [T]; return whether it passed the gate (eq. 4)."""
     f = heading.filter
-    printed = params.printed_6 > 0.0
     yaw, roll = f.x[0] - params.declination, f.x[1]
     pitch = heading.pitch
     horizontal, up = params.field_horizontal, params.field_up
-    expected = field_in_vehicle(yaw, roll, pitch, horizontal, up, printed)
+    expected = field_in_vehicle(yaw, roll, pitch, horizontal, up)
     f.residual[0] = x - expected[0]
     f.residual[1] = y - expected[1]
     f.residual[2] = z - expected[2]
@@ -210,19 +230,19 @@ def heading_update_field(heading, x, y, z, params):
     lifted = north * np.sin(pitch) + up * np.cos(pitch)
     slope = north * np.cos(pitch) - up * np.sin(pitch)  # of `lifted` to the pitch
     cosine, sine = np.cos(roll), np.sin(roll)
+    first = west_in_z(north, west, roll)
     f.H[0, 0] = -west * np.cos(pitch)
     f.H[1, 0] = -north * cosine - west * np.sin(pitch) * sine
-    f.H[2, 0] = north * (cosine if printed else sine) - west * np.sin(pitch) * cosine
+    f.H[2, 0] = first[1] - west * np.sin(pitch) * cosine
     f.H[0, 1] = 0.0
     f.H[1, 1] = west * sine + lifted * cosine
-    f.H[2, 1] = (-west * sine if printed else west * cosine) - lifted * sine
+    f.H[2, 1] = first[2] - lifted * sine
     by_pitch = (-lifted, slope * sine, slope * cosine)
     for i in range(3):
         for j in range(3):
             f.R[i, j] = params.pitch_std**2 * by_pitch[i] * by_pitch[j]
         f.R[i, i] += params.magnetometer_std**2
-    distance = innovation_distance(f)
-    if not (np.sqrt(distance) if params.printed_4 > 0.0 else distance) <= params.gate:
+    if not is_probable(innovation_distance(f), params.gate):
         heading.rejected += 1
         return False
     correct(f)
@@ -356,11 +376,11 @@ class HeadingEkf(CompiledMethod):
     vehicle_parameters = HEADING_VEHICLE
     parameters = HEADING_PARAMETERS
     variants = {
-        "paper": PRINTED_HEADING,
         "table_1_noise": TABLE_1_NOISE,
         "pitch_aware": PITCH_AWARE,
         "no_roll_model": NO_ROLL_MODEL,
         "no_rejection": {"gate": UNGATED},
     }
+    printed = "gripbench.methods.printed.yoon2015"
     state = np.dtype([("heading", HEADING_STATE)])
     step = _step

@@ -9,7 +9,7 @@ be learnt.
 Errata: (4) prints the noise of a step as T^2 for both states, which suits white gyro noise given
 for a sample but makes the walk of the bias depend on the sample rate; spectral densities times
 the elapsed time do not. Its R has a second row for a measurement that does not exist.
-`variant="paper"` keeps the printed form, with the forward Euler step of (3).
+`gripbench.methods.printed.anderson2004` has the printed forms, with the forward Euler step of (3).
 
 Beyond the paper: the scale factor of the gyroscope can be a state (`gyro_scale_std` above 0,
 variant `scale_factor`). The course before and after a turn then shows it, from the covariance
@@ -62,7 +62,6 @@ KINEMATIC_PARAMETERS = (
     Parameter("turn_hold", 2.0, "s", "How long a turn lasts after the yaw rate has fallen", 0.0),
     Parameter("turn_smoothing", 0.3, "s", "Time constant of the turn detection", 1e-3),
     Parameter("lowest_speed", 2.0, "m/s", "Below it the course is left out", 0.1),
-    Parameter("printed_equations", False, "-", "Eq. 3 and 4 as printed"),
 )
 
 
@@ -80,6 +79,18 @@ def start_kinematic(state, params):
 
 
 @compiled
+def held_rate(before, now):
+    """Return the yaw rate that counts between two readings [rad/s], eq. 3: their mean."""
+    return 0.5 * (before + now)
+
+
+@compiled
+def walk_time(elapsed):
+    """Return what the variance of the bias grows with, eq. 4: the time [s]."""
+    return elapsed
+
+
+@compiled
 def advance_kinematic(state, obs, params):
     """Take one sample; return whether it brought a course that was used."""
     filter = state.filter
@@ -87,15 +98,13 @@ def advance_kinematic(state, obs, params):
     elapsed = obs.time - state.time if state.samples > 0.0 else 0.0
     if state.samples == 0.0:
         state.rate = obs.yaw_rate
-    mean = state.rate if params.printed_equations > 0.0 else 0.5 * (state.rate + obs.yaw_rate)
-    corrected = (mean - x[1]) / x[2]
+    corrected = (held_rate(state.rate, obs.yaw_rate) - x[1]) / x[2]
     state.integrated += elapsed * corrected
     x[0] += elapsed * corrected
     filter.F[0, 1] = -elapsed / x[2]
     filter.F[0, 2] = -elapsed * corrected / x[2]
-    walk = elapsed * elapsed if params.printed_equations > 0.0 else elapsed
     filter.Q[0, 0] = params.gyro_noise**2 * elapsed / x[2] ** 2
-    filter.Q[1, 1] = params.bias_walk**2 * walk
+    filter.Q[1, 1] = params.bias_walk**2 * walk_time(elapsed)
     predict_covariance(filter)
 
     share = -np.expm1(-elapsed / params.turn_smoothing)
@@ -153,7 +162,8 @@ class KinematicKalmanFilter(CompiledMethod):
     estimates = ("sideslip", "yaw", "yaw_rate", "gyro_bias", "gyro_scale")
     variances = ("sideslip", "yaw", "gyro_bias", "gyro_scale")
     parameters = KINEMATIC_PARAMETERS
-    variants = {"paper": {"printed_equations": True}, "scale_factor": {"gyro_scale_std": 0.02}}
+    variants = {"scale_factor": {"gyro_scale_std": 0.02}}
+    printed = "gripbench.methods.printed.anderson2004"
     state = KINEMATIC_STATE
     start = staticmethod(start_kinematic)
     step = staticmethod(_step)

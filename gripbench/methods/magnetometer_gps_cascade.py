@@ -22,6 +22,7 @@ from gripbench.methods.friction_ekf import (
     FRICTION_PARAMETERS,
     FRICTION_STATE,
     FRICTION_VEHICLE,
+    acceleration_of_forces,
     friction_step,
 )
 from gripbench.methods.heading_ekf import (
@@ -31,11 +32,11 @@ from gripbench.methods.heading_ekf import (
     HEADING_VEHICLE,
     NO_ROLL_MODEL,
     PITCH_AWARE,
-    PRINTED_HEADING,
     TABLE_1_NOISE,
     UNGATED,
     heading_step,
     wrapped,
+    yaw_speed,
 )
 from gripbench.methods.sideslip_kalman_filter import (
     SIDESLIP_PARAMETERS,
@@ -57,18 +58,18 @@ def _step(state, obs, params, est):
     heading_step(heading, obs, params)
     yaw, roll = heading.filter.x[0], heading.filter.x[1]
     yaw_variance = heading.filter.P[0, 0]
-    yaw_rate = obs.yaw_rate if params.printed_7 > 0.0 else obs.yaw_rate / np.cos(roll)
+    turning = yaw_speed(obs.yaw_rate, roll)
     accel_x = obs.accel_x + GRAVITY * np.sin(heading.pitch)
     accel_y = obs.accel_y - GRAVITY * np.sin(roll)
-    sideslip_step(sideslip, obs.time, accel_x, accel_y, yaw_rate, yaw, roll, yaw_variance, params)
+    sideslip_step(sideslip, obs.time, accel_x, accel_y, turning, yaw, roll, yaw_variance, params)
     if obs.velocity_north_new > 0.0:
         sideslip_gps(
             sideslip, obs.gps_time, obs.velocity_north, obs.velocity_west, obs.velocity_up, params
         )
     now = sideslip.now
-    of_forces = obs.accel_y if params.printed_16 > 0.0 else accel_y - now.x[3]
+    of_forces = acceleration_of_forces(obs.accel_y, accel_y, now.x[3])
     friction_step(
-        friction, obs.time, now.x[0], now.x[2], yaw_rate, obs.steer_angle, of_forces, params
+        friction, obs.time, now.x[0], now.x[2], turning, obs.steer_angle, of_forces, params
     )
     # An error of the heading turns the velocity as it is: the filter cannot average it away.
     sideslip_angle, sideslip_variance = sideslip_estimate(now)
@@ -92,7 +93,6 @@ class MagnetometerGpsCascade(CompiledMethod):
     vehicle_parameters = (*HEADING_VEHICLE, *FRICTION_VEHICLE)
     parameters = (*HEADING_PARAMETERS, *SIDESLIP_PARAMETERS, *FRICTION_PARAMETERS)
     variants = {
-        "paper": PRINTED_HEADING | {"printed_15": True, "printed_16": True},
         "table_1_noise": TABLE_1_NOISE,
         "pitch_aware": PITCH_AWARE,
         "no_roll_model": NO_ROLL_MODEL,
@@ -101,6 +101,7 @@ class MagnetometerGpsCascade(CompiledMethod):
         "single_delay": {"delay_handling": "larsen"},
         "no_bias_states": {"bias_std": 0.0, "bias_walk": 0.0},
     }
+    printed = "gripbench.methods.printed.yoon2015"
     state = CASCADE_STATE
     step = _step
 

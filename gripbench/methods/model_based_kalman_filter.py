@@ -12,7 +12,8 @@ Errata, corrected here:
   held over a step like the angle itself, so its covariance goes through the same input matrix.
 - (5) lacks the bank of (1): with the variant `bank`, g sin(bank)/V enters the sideslip row.
 - (8): the variance of the course innovation is H P H' + R, which includes the covariance of
-  sideslip and heading; `printed_equations = 1` reports the printed sum (no state depends on it).
+  sideslip and heading (no state depends on it); `gripbench.methods.printed.anderson2004` has the
+  printed sum.
 
 A late GPS sample is compared with the course that was predicted for its own time; a repeated or
 out-of-order one is left out.
@@ -77,7 +78,6 @@ MODEL_BASED_PARAMETERS = (
     Parameter("bias_std", 1.745e-2, "rad/s", "Standard deviation of the bias at the start", 0.0),
     Parameter("sideslip_std", 1.745e-2, "rad", "Standard deviation of sideslip at the start", 0.0),
     Parameter("lowest_speed", 3.0, "m/s", "Speed below which the model is held at it", 0.5),
-    Parameter("printed_equations", False, "-", "Innovation variance of eq. 8 as printed"),
 )
 
 
@@ -115,6 +115,12 @@ def single_track(model, mass, inertia, a, b, front, rear, speed):
     model[0, 3] = front / (mass * speed)
     model[1, 3] = a * front / inertia
     model[0, 4] = -GRAVITY / speed  # left side up (positive bank): gravity pulls to the right
+
+
+@compiled
+def course_variance(P, variance):
+    """Return the variance of the course innovation [rad^2], eq. 8, from that of the course."""
+    return P[0, 0] + P[2, 2] + variance + 2.0 * P[0, 2]
 
 
 @compiled
@@ -193,11 +199,8 @@ def advance_model_based(state, obs, params, bank, front, rear):
                     filter.P[2, i] = -filter.P[0, i]
                     filter.P[i, 2] = filter.P[2, i]
         else:
-            P = filter.P
             state.course_innovation = wrapped(obs.course - (x[0] + x[2] - turned))
-            state.course_innovation_variance = P[0, 0] + P[2, 2] + variance
-            if params.printed_equations == 0.0:
-                state.course_innovation_variance += 2.0 * P[0, 2]
+            state.course_innovation_variance = course_variance(filter.P, variance)
             correct_scalar(filter, state.course_innovation, variance)
     # The noise of a sample goes with the sample rate; the first sample has no elapsed time yet.
     variance = params.gyro_noise**2 / (elapsed if elapsed > 0.0 else 0.01)
@@ -277,9 +280,9 @@ class ModelBasedKalmanFilter(CompiledMethod):
     vehicle_parameters = SINGLE_TRACK
     parameters = MODEL_BASED_PARAMETERS
     variants = {
-        "paper": {"printed_equations": True},
         "bank": Variant(sensors=(*MODEL_BASED_SENSORS, "road_bank"), step=_step_with_bank),
     }
+    printed = "gripbench.methods.printed.anderson2004"
     state = MODEL_BASED_STATE
     start = staticmethod(start_model_based)
     step = staticmethod(_step)

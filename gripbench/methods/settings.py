@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import importlib
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -102,12 +103,52 @@ class Variant:
         Its step instead of the method's.
     vehicle_parameters
         Vehicle parameters that it reads instead of the method's.
+    functions
+        By function of the method: what its step calls instead, at any depth.
     """
 
     settings: Mapping[str, Setting] = field(default_factory=dict)
     sensors: tuple[str, ...] | None = None
     step: Callable[..., Any] | None = None
     vehicle_parameters: tuple[str, ...] | None = None
+    functions: Mapping[Callable[..., Any], Callable[..., Any]] = field(default_factory=dict)
+
+
+class Variants(Mapping[str, Variant]):
+    """The variants of a method by name: its own, then the forms that its paper prints.
+
+    Parameters
+    ----------
+    name
+        Name of the method.
+    own
+        Its variants, each a `Variant` or only its settings.
+    printed
+        Module whose `FORMS` hold the printed ones by method; it imports the method, so it is read
+        when a variant is first looked for. Empty: none.
+    """
+
+    def __init__(self, name: str, own: Mapping[str, Any], printed: str) -> None:
+        self._name, self._printed = name, printed
+        self._known = {
+            key: given if isinstance(given, Variant) else Variant(given)
+            for key, given in own.items()
+        }
+
+    def __getitem__(self, name: str) -> Variant:
+        return self._all()[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._all())
+
+    def __len__(self) -> int:
+        return len(self._all())
+
+    def _all(self) -> dict[str, Variant]:
+        if self._printed:
+            forms = importlib.import_module(self._printed).FORMS[self._name]
+            self._known, self._printed = forms | self._known, ""
+        return self._known
 
 
 def checked_settings(

@@ -30,7 +30,7 @@ def synthetic(seed, n=400, noise=0.1, size=0.15, bias=0.1):
 def test_force_is_that_of_the_filter():
     angles = np.linspace(-0.5, 0.5, 41)
     ours = brush_lateral_force(angles, 0.3, 6e3, 5e4)
-    filters = [brush_force(angle, 0.3, 6e3, 5e4, False)[0] for angle in angles]
+    filters = [brush_force(angle, 0.3, 6e3, 5e4)[0] for angle in angles]
     np.testing.assert_allclose(ours, filters, rtol=1e-12, atol=1e-9)
 
 

@@ -7,11 +7,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lateral_twins import dugoff_model
 
+from gripbench.compilation import replacing
 from gripbench.envs.tyres.combined import DUGOFF, combined_force
 from gripbench.envs.vehicles import load_vehicle
 from gripbench.envs.worlds import load_scenario, record
 from gripbench.methods.blocks.dugoff_tyre import dugoff_force, dugoff_slips
 from gripbench.methods.dugoff_ekf import DugoffEkf, evaluate
+from gripbench.methods.printed.dakhlallah2008 import printed_slips
 from gripbench.methods.samples import select_channels
 
 VEHICLE = load_vehicle("dakhlallah2008").values()
@@ -47,31 +49,33 @@ def test_force_slopes_are_the_derivatives(x, y, capacity):
     np.testing.assert_allclose([dx[0], dx[1], dy[0], dy[1]], [xx, xy, xy, yy], atol=1e-5)
 
 
-@given(speeds, st.floats(0.7, 1.3), st.floats(-0.5, 0.5), st.sampled_from([0.0, 1.0]))
-def test_slips_are_those_of_the_paper(speed, ratio, tangent, printed):
+@pytest.mark.parametrize("slips", [dugoff_slips, printed_slips])
+@given(speed=speeds, ratio=st.floats(0.7, 1.3), tangent=st.floats(-0.5, 0.5))
+def test_slips_are_those_of_the_paper(slips, speed, ratio, tangent):
     rolling, lateral = ratio * speed, -tangent * speed
     slip = (rolling - speed) / max(rolling, speed)
-    base = 1.0 - (slip if printed else abs(slip))
-    x, y, x_v, y_v, y_l = dugoff_slips(rolling, speed, lateral, printed)
+    base = 1.0 - (slip if slips is printed_slips else abs(slip))
+    x, y, x_v, y_v, y_l = slips(rolling, speed, lateral)
     assert x == pytest.approx(slip / base, abs=1e-12)
     assert y == pytest.approx(tangent / base, abs=1e-12)
     if abs(ratio - 1.0) < 1e-4:
         return
     h = 1e-6
-    up, down = (dugoff_slips(rolling, speed + s * h, lateral, printed) for s in (1, -1))
+    up, down = (slips(rolling, speed + s * h, lateral) for s in (1, -1))
     np.testing.assert_allclose([x_v, y_v], [(up[i] - down[i]) / (2 * h) for i in (0, 1)], atol=1e-6)
-    up, down = (dugoff_slips(rolling, speed, lateral + s * h, printed) for s in (1, -1))
+    up, down = (slips(rolling, speed, lateral + s * h) for s in (1, -1))
     assert y_l == pytest.approx((up[1] - down[1]) / (2 * h), abs=1e-6)
 
 
-@pytest.mark.parametrize("printed_slip", [0.0, 1.0])
-def test_jacobian_is_the_derivative_of_the_model(printed_slip):
-    state, params = dugoff_model(VEHICLE, {"printed_slip": printed_slip})
+@pytest.mark.parametrize("slips", [dugoff_slips, printed_slips])
+def test_jacobian_is_the_derivative_of_the_model(slips):
+    model = replacing(evaluate, {dugoff_slips: slips}, "test")
+    state, params = dugoff_model(VEHICLE)
     rng = np.random.default_rng(0)
 
     def rate(x):
         state["filter"]["x"][:] = x
-        evaluate(state, params)
+        model(state, params)
         return state["rate"].copy()
 
     for _ in range(100):

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from kinematic_drive import VEHICLE
 from scipy.integrate import quad
 
+from gripbench.compilation import replacing
 from gripbench.envs.vehicles import GRAVITY
 from gripbench.methods.friction_ekf import (
     FRICTION_PARAMETERS,
@@ -19,6 +20,7 @@ from gripbench.methods.friction_ekf import (
     lateral_acceleration,
     slip_angles,
 )
+from gripbench.methods.printed.yoon2015 import EQ_15
 
 
 def parameters(**overrides):
@@ -47,7 +49,7 @@ def contact_patch(slip_angle, mu, load, tread, half_length):
 def test_brush_force_is_the_integral_over_the_contact_patch(angle, mu, load, half_length):
     tread = 3e6
     stiffness = 2.0 * tread * half_length**2
-    force, _ = brush_force(angle, mu, load, stiffness, False)
+    force, _ = brush_force(angle, mu, load, stiffness)
     expected = contact_patch(angle, mu, load, tread, half_length)
     assert force == pytest.approx(expected, rel=1e-6)
 
@@ -56,12 +58,12 @@ def test_brush_force_is_the_integral_over_the_contact_patch(angle, mu, load, hal
 @settings(max_examples=50, deadline=None)
 def test_brush_force_is_odd_bounded_and_its_slope_right(angle, mu):
     load, stiffness = 6e3, 5e4
-    force, slope = brush_force(angle, mu, load, stiffness, False)
-    assert force == -brush_force(-angle, mu, load, stiffness, False)[0]
+    force, slope = brush_force(angle, mu, load, stiffness)
+    assert force == -brush_force(-angle, mu, load, stiffness)[0]
     assert abs(force) <= mu * load * (1.0 + 1e-12)
     e = 1e-6
-    above = brush_force(angle, mu + e, load, stiffness, False)[0]
-    below = brush_force(angle, mu - e, load, stiffness, False)[0]
+    above = brush_force(angle, mu + e, load, stiffness)[0]
+    below = brush_force(angle, mu - e, load, stiffness)[0]
     assert slope == pytest.approx((above - below) / (2.0 * e), rel=1e-4, abs=1e-2)
 
 
@@ -69,9 +71,10 @@ def test_printed_condition_exceeds_the_friction_to_the_left():
     """At theta sigma = -2 the force of eq. 15 as printed is -2 mu F_z."""
     mu, load, stiffness = 0.3, 5e3, 5e4
     angle = -np.arctan(2.0 * 3.0 * mu * load / stiffness)
-    assert brush_force(angle, mu, load, stiffness, True)[0] == pytest.approx(-2.0 * mu * load)
-    assert brush_force(angle, mu, load, stiffness, False)[0] == pytest.approx(-mu * load)
-    assert brush_force(-angle, mu, load, stiffness, True)[0] == pytest.approx(mu * load)
+    printed = replacing(brush_force, EQ_15, "test")
+    assert printed(angle, mu, load, stiffness)[0] == pytest.approx(-2.0 * mu * load)
+    assert brush_force(angle, mu, load, stiffness)[0] == pytest.approx(-mu * load)
+    assert printed(-angle, mu, load, stiffness)[0] == pytest.approx(mu * load)
 
 
 def test_slip_angles_agree_with_equation_14_when_small():

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from kinematic_drive import FIELD, VEHICLE, drive
 from scipy.spatial.transform import Rotation
 
+from gripbench.compilation import replacing
 from gripbench.methods.heading_ekf import (
     HeadingEkf,
     field_in_vehicle,
@@ -16,6 +17,7 @@ from gripbench.methods.heading_ekf import (
     heading_update_field,
     wrapped,
 )
+from gripbench.methods.printed.yoon2015 import EQ_6
 
 angles = st.floats(-3.0, 3.0)
 tilts = st.floats(-0.5, 0.5)
@@ -25,14 +27,15 @@ tilts = st.floats(-0.5, 0.5)
 @settings(max_examples=50, deadline=None)
 def test_field_is_the_rotation_of_the_earths_field(yaw, roll, pitch):
     turned = Rotation.from_euler("ZYX", [yaw, pitch, roll]).inv().apply([FIELD[0], 0.0, FIELD[1]])
-    ours = field_in_vehicle(yaw, roll, pitch, *FIELD, False)
+    ours = field_in_vehicle(yaw, roll, pitch, *FIELD)
     np.testing.assert_allclose(ours, turned, rtol=1e-12, atol=1e-19)
 
 
 def test_printed_field_has_the_wrong_length():
     """A rotation keeps the length of the field; eq. 6 as printed does not."""
-    right = np.linalg.norm(field_in_vehicle(1.0, 0.0, 0.0, *FIELD, False))
-    printed = np.linalg.norm(field_in_vehicle(1.0, 0.0, 0.0, *FIELD, True))
+    right = np.linalg.norm(field_in_vehicle(1.0, 0.0, 0.0, *FIELD))
+    printed_field = replacing(field_in_vehicle, EQ_6, "test")
+    printed = np.linalg.norm(printed_field(1.0, 0.0, 0.0, *FIELD))
     assert right == pytest.approx(np.hypot(*FIELD), rel=1e-12)
     assert abs(printed / right - 1.0) > 0.1
 
@@ -57,7 +60,7 @@ def test_predict_and_update_agree_with_filterpy():
     micro = 1e6  # the twin counts in microtesla, which conditions its inverse
 
     def h(x, pitch=0.0):
-        return micro * np.array(field_in_vehicle(x[0], x[1], pitch, *FIELD, False))
+        return micro * np.array(field_in_vehicle(x[0], x[1], pitch, *FIELD))
 
     def slope(f, x, i):  # five-point stencil: exact to 1e-11 for these sines
         e = 2e-3 * np.eye(len(x))[i]
@@ -71,9 +74,7 @@ def test_predict_and_update_agree_with_filterpy():
     for _ in range(100):
         yaw_rate, roll_rate = rng.normal(size=2) * 0.2
         accel_y = rng.normal()
-        field = np.array(
-            field_in_vehicle(*(twin.x + rng.normal(size=2) * 0.01), 0.0, *FIELD, False)
-        )
+        field = np.array(field_in_vehicle(*(twin.x + rng.normal(size=2) * 0.01), 0.0, *FIELD))
         field += rng.normal(size=3) * 2e-7
         roll = twin.x[1]
         twin.F = np.array([[1.0, dt * yaw_rate * np.sin(roll) / np.cos(roll) ** 2], [0.0, decay]])
@@ -105,7 +106,7 @@ def test_the_first_covariance_is_that_of_the_first_errors():
     for _ in range(2000):
         roll = set_["roll_std"] * rng.normal()
         pitch = set_["alignment_pitch_std"] * rng.normal()
-        field = np.array(field_in_vehicle(0.7, roll, pitch, *FIELD, False))
+        field = np.array(field_in_vehicle(0.7, roll, pitch, *FIELD))
         field += set_["magnetometer_std"] * rng.normal(size=3)
         for axis, value in zip("xyz", field, strict=True):
             sample[f"magnetic_field_{axis}"] = value

@@ -15,7 +15,7 @@ VEHICLE = {
 
 def _drive(friction, noise=0.2, count=4000):
     rng = np.random.default_rng(4)
-    params = np.zeros(1, [(name, float) for name in (*VEHICLE, "printed_15")])
+    params = np.zeros(1, [(name, float) for name in VEHICLE])
     for name, value in VEHICLE.items():
         params[name] = value
     seen = np.zeros(count, record_type(("time", *VelocityFrictionEkf.sensors)))

@@ -4,7 +4,7 @@ With the linear forces g = (C_x lambda, C_y tan alpha) / (1 - |lambda|) and sigm
 the force is k g, k = (2 - sigma) sigma below sigma = 1, else 1.
 
 Erratum: (2) and (4) print 1 - lambda, which makes a braked wheel softer than a driven one; Dugoff's
-model has 1 - |lambda|. `printed = 1` keeps the printed form.
+model has 1 - |lambda|.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from gripbench.compilation import compiled
 
 
 @compiled
-def dugoff_slips(rolling, speed, lateral, printed):
+def dugoff_slips(rolling, speed, lateral):
     """Return lambda/(1 - |lambda|), tan(alpha)/(1 - |lambda|) and their slopes.
 
     Parameters
@@ -24,8 +24,6 @@ def dugoff_slips(rolling, speed, lateral, printed):
         Wheel radius times wheel speed [m/s], above 0.
     speed, lateral
         Velocity of the wheel's centre along and across the wheel [m/s], `speed` above 0.
-    printed
-        Above 0: 1 - lambda instead of 1 - |lambda|.
 
     Returns
     -------
@@ -40,15 +38,6 @@ def dugoff_slips(rolling, speed, lateral, printed):
             -share,
             2.0 * lateral * share / speed,
             -share,
-        )
-    if printed > 0.0:
-        base = 2.0 * speed - rolling
-        return (
-            (rolling - speed) / base,
-            -lateral / base,
-            -rolling / (base * base),
-            2.0 * lateral / (base * base),
-            -1.0 / base,
         )
     return (rolling - speed) / rolling, -lateral / rolling, -1.0 / rolling, 0.0, -1.0 / rolling
 

@@ -24,6 +24,7 @@ from gripbench.bench.papers.yoon2015.brush_identification import (
     lateral_test,
     separability,
 )
+from gripbench.compilation import replacing
 from gripbench.envs.plants.planar.world import PlanarScenario
 from gripbench.envs.recordings import Recording
 from gripbench.envs.roads.road import MagneticField
@@ -31,6 +32,7 @@ from gripbench.envs.vehicles import GRAVITY
 from gripbench.envs.worlds import load_scenario, record
 from gripbench.methods.heading_ekf import field_in_vehicle
 from gripbench.methods.magnetometer_gps_cascade import MagnetometerGpsCascade
+from gripbench.methods.printed.yoon2015 import EQ_6
 
 NAME = "yoon2015"
 
@@ -47,15 +49,10 @@ _BAND, _HOLD, _LAST = 0.2, 1.0, 2.0
 _PASSING = MagneticField(pulse_rate=0.15)  # as on the public road
 
 _METHODS: dict[str, MagnetometerGpsCascade] = {
-    **{
-        variant: MagnetometerGpsCascade(variant)
-        for variant in ("corrected", *MagnetometerGpsCascade.variants)
-    },
-    **{
-        name: MagnetometerGpsCascade("corrected", **{name: 1.0})
-        for name in ("printed_4", "printed_6", "printed_7", "printed_15", "printed_16")
-    },
+    variant: MagnetometerGpsCascade(variant)
+    for variant in ("corrected", *MagnetometerGpsCascade.variants)
 }
+_PRINTED_FIELD = replacing(field_in_vehicle, EQ_6, "paper_6")
 _ON_PUBLIC_ROADS = (
     "corrected",
     "pitch_aware",
@@ -195,7 +192,7 @@ def _sideslip_errors(recording: Recording, estimates: npt.NDArray[Any]) -> Array
 
 
 def _track(recordings: Iterator[Recording]) -> dict[str, float]:
-    names = [name for name in _METHODS if name not in ("no_rejection", "printed_4")]
+    names = [name for name in _METHODS if name not in ("no_rejection", "paper_4")]
     seen = _Collected()
     for recording in recordings:
         seen.runs += 1
@@ -231,9 +228,9 @@ def _track(recordings: Iterator[Recording]) -> dict[str, float]:
         "printed_16_accel": seen.rms("printed_16_accel"),
     }
     for number in (6, 7):
-        found[f"printed_{number}_sideslip"] = seen.rms_degrees(f"printed_{number}")
+        found[f"printed_{number}_sideslip"] = seen.rms_degrees(f"paper_{number}")
     for number in (15, 16):
-        errors = np.array(seen.friction[f"printed_{number}"])[:, 0]
+        errors = np.array(seen.friction[f"paper_{number}"])[:, 0]
         found[f"printed_{number}_friction"] = float(np.abs(errors).mean())
     return found
 
@@ -257,7 +254,7 @@ def _printed_on_track(seen: _Collected, recording: Recording) -> None:
     horizontal, up = settings["field_horizontal"], settings["field_up"]
     every = truth[:: max(len(truth) // 200, 1)]
     z = [
-        field_in_vehicle(yaw, roll, 0.0, horizontal, up, True)[2]
+        _PRINTED_FIELD(yaw, roll, 0.0, horizontal, up)[2]
         for yaw, roll in zip(every["yaw"], every["roll"], strict=True)
     ]
     seen.add("printed_6_field", np.array(z) - every["magnetic_field_z"])
@@ -266,12 +263,12 @@ def _printed_on_track(seen: _Collected, recording: Recording) -> None:
 def _passing_vehicles(recordings: Iterator[Recording]) -> dict[str, float]:
     seen = _Collected()
     for recording in recordings:
-        for name in ("corrected", "no_rejection", "printed_4"):
+        for name in ("corrected", "no_rejection", "paper_4"):
             seen.add(name, _sideslip_errors(recording, _estimates(recording, name)))
     return {
         "passing_with_rejection": seen.rms_degrees("corrected"),
         "passing_no_rejection": seen.rms_degrees("no_rejection"),
-        "passing_printed_4": seen.rms_degrees("printed_4"),
+        "passing_printed_4": seen.rms_degrees("paper_4"),
     }
 
 
