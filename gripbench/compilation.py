@@ -6,6 +6,7 @@ they are and numba out, which is most of what such a command would take.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from types import CodeType, FunctionType
 from typing import Any
@@ -33,7 +34,12 @@ def _njit(function: Callable[..., Any], **options: Any) -> Any:
     if _declare_only:
         return function
     import numba  # .4 s
+    from numba.core.errors import NumbaExperimentalFeatureWarning
 
+    # a record with more fields than the first that a function was compiled for is read the same
+    warnings.filterwarnings(
+        "ignore", "(?s).*considered a subtype", category=NumbaExperimentalFeatureWarning
+    )
     return numba.njit(error_model="numpy", **options)(function)
 
 

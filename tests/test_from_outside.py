@@ -149,6 +149,7 @@ def gripbench(tmp_path):
     return run
 
 
+@pytest.mark.slow
 def test_a_package_adds_a_channel_a_plant_a_scenario_and_a_method(gripbench):
     done = gripbench("run", "--scenario", "sledge.toml", "--method", "pull", "--seeds", "1")
     assert done.returncode == 0, done.stderr
@@ -157,6 +158,7 @@ def test_a_package_adds_a_channel_a_plant_a_scenario_and_a_method(gripbench):
     assert "rope_force" in done.stdout
 
 
+@pytest.mark.slow
 def test_a_package_adds_a_paper(gripbench, tmp_path):
     done = gripbench("reproduce", "sledge2026", "--results", "out")
     assert done.returncode == 0, done.stderr

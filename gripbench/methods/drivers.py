@@ -151,7 +151,8 @@ def _call(method: CompiledMethod, function: Callable[..., Any], *records: npt.ND
         found = re.search(r"Field '(\w+)' was not found in record", str(error))
         if found:
             raise _undeclared(method, found.group(1)) from None
-        lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+        plain = re.sub(r"\x1b\[\d*m", "", str(error))  # numba's colours
+        lines = [line.strip() for line in plain.splitlines() if line.strip()]
         raise GripbenchError(
             f"{method.name}: step cannot be compiled: {' '.join(lines[:4])}"
         ) from None

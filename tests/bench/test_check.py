@@ -218,7 +218,14 @@ def test_a_sound_plain_class_passes():
     assert [name for name, text in results.items() if text != PASSED] == left
 
 
-@pytest.mark.parametrize("name", built_in_methods())
+QUICK = ("slip_slope", "single_track_kalman_filter")
+EVERY = [
+    pytest.param(name, marks=() if name in QUICK else pytest.mark.slow)  # each compiles its loops
+    for name in built_in_methods()
+]
+
+
+@pytest.mark.parametrize("name", EVERY)
 def test_every_built_in_method_passes(name):
     assert failures(check_estimator(name)) == {}
 
@@ -226,7 +233,7 @@ def test_every_built_in_method_passes(name):
 NUMERICAL = [name for name in CHECKS if name.startswith(("survives", "finite", "variance"))]
 
 
-@pytest.mark.parametrize("name", built_in_methods())
+@pytest.mark.parametrize("name", EVERY)
 def test_every_variant_passes_what_its_numbers_decide(name):
     method = built_in_methods()[name]
     found = {

@@ -115,6 +115,7 @@ def test_a_mistake_is_one_line(arguments, message, tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("compiled", [False, True])
 def test_new_method_writes_one_that_passes_and_runs(compiled, tmp_path, short_scenario):
     extra = ["--compiled"] if compiled else []

@@ -19,6 +19,7 @@ pytestmark = [
 ]
 
 
+@pytest.mark.slow
 def test_a_killed_worker_changes_nothing(short_scenario, tmp_path):
     arguments = {"scenarios": [short_scenario], "methods": ["slip_slope"], "seeds": 60}
     alone = gripbench.run(**arguments, results=tmp_path / "alone", workers=1)

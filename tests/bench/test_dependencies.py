@@ -118,6 +118,7 @@ def run(scenario, results, *methods):
 ALL = ("weights", "declares", "on_path", "by_name", "lists", "constant", "late_compiled")
 
 
+@pytest.mark.slow
 def test_a_method_runs_again_when_anything_that_it_reads_is_another(
     short_scenario, folder, tmp_path
 ):
@@ -229,6 +230,7 @@ print(json.dumps(found))
 """
 
 
+@pytest.mark.slow
 def test_an_edited_file_runs_anew_in_one_python_session(short_scenario, tmp_path):
     (tmp_path / "mine.py").write_text(PLAIN.format(name="mine", reset="pass", gain="GAIN", more=""))
     told = [tmp_path / "mine.py", short_scenario, tmp_path / "r"]

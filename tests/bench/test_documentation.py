@@ -12,19 +12,18 @@ from gripbench.bench.catalogue.registry import built_in_methods
 from gripbench.bench.publishing import leaderboard, method_pages
 
 ROOT = Path(__file__).parents[2]
-PAGES = (
+QUICK = ("docs/add-a-vehicle.md", "docs/contract.md", "docs/extend.md")
+SLOW = (
     "README.md",
     "docs/index.md",
     "docs/add-a-method.md",
     "docs/add-a-scenario.md",
-    "docs/add-a-vehicle.md",
-    "docs/contract.md",
-    "docs/extend.md",
     "docs/figures.md",
     "docs/ranking.md",
     "docs/api.md",
     "docs/environments.md",
 )
+PAGES = (*QUICK, *(pytest.param(page, marks=pytest.mark.slow) for page in SLOW))
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 FILE = re.compile(r"# (\S+\.(?:py|toml))\n")
 

@@ -77,6 +77,7 @@ def test_one_figure_of_each_paper_is_written(paper, label, tmp_path):
     assert choose(paper, [label])[0].caption in index
 
 
+@pytest.mark.slow
 def test_the_same_figure_gives_the_same_bytes(tmp_path):
     for name in ("first", "second"):
         write_figures("li2014", tmp_path / name, ["3", "overview"], dpi=40)

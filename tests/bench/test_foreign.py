@@ -82,6 +82,7 @@ def test_c_program_and_python_give_the_same_estimates(tmp_path, program, twin, s
     assert not np.allclose(slow["force_x_front"], expected, rtol=0.1)
 
 
+@pytest.mark.slow
 @needs_gcc
 def test_they_rank_beside_a_built_in_one_and_run_again_when_they_change(
     tmp_path, program, short_scenario

@@ -28,7 +28,8 @@ def started(*arguments, **options):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("rows", [1, pytest.param(0, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("rows", [0, 1])
 def test_an_interrupted_run_says_what_is_kept(short_scenario, tmp_path, rows):
     results = tmp_path / "r"
     run = ["run", "--scenario", short_scenario, "--method", "slip_slope", "--seeds", "3000"]

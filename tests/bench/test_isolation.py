@@ -151,6 +151,7 @@ def _recorded(seconds=0.2):
     return gripbench.record(scenario, 0)
 
 
+@pytest.mark.slow
 def test_without_forks(plugins, monkeypatch):
     """The way of systems that cannot fork: one interpreter a cell, over its standard streams."""
     monkeypatch.setattr(processes, "FORKS", False)

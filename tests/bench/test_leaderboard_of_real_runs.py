@@ -1,5 +1,6 @@
 """From a class in a file to a leaderboard, and an edit that makes it worse."""
 
+import pytest
 from typer.testing import CliRunner
 
 import gripbench
@@ -19,6 +20,7 @@ class Guess:
 """
 
 
+@pytest.mark.slow
 def test_edited_method_is_run_again_and_compared(tmp_path):
     plugin, results, base = tmp_path / "guess.py", tmp_path / "results", tmp_path / "base"
 

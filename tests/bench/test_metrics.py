@@ -51,6 +51,7 @@ def outside(tmp_path):
     return site
 
 
+@pytest.mark.slow
 def test_a_metric_from_outside_is_scored_stored_ranked_and_shown(outside, tmp_path):
     environment = {**os.environ, "PYTHONPATH": str(outside)}
 

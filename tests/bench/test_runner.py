@@ -176,6 +176,7 @@ def test_the_run_goes_on_where_workers_were_lost(plan, tmp_path, monkeypatch):
     assert scores_csv(read_rows(tmp_path / "flaky")) == scores_csv(read_rows(whole))
 
 
+@pytest.mark.slow
 def test_a_run_that_is_killed_goes_on_and_ends_the_same(short_scenario, tmp_path):
     arguments = {"scenarios": [short_scenario], "methods": METHODS, "seeds": SEEDS, "workers": 1}
     program = Path(__file__).parent / "killed_runs.py"

@@ -74,12 +74,14 @@ def replay(published, folder, rows, slower=1.0):
     return status, (folder / "summary.md").read_text()
 
 
+@pytest.mark.slow
 def test_a_clean_change_passes(published, tmp_path):
     status, summary = replay(published, tmp_path, noisy_rows(FACTORS))
     assert status == 0
     assert "No change." in summary
 
 
+@pytest.mark.slow
 def test_an_rms_and_a_runtime_that_became_worse_fail_and_are_named(published, tmp_path):
     worse = noisy_rows({"a": 1.0, "b": 2.1})
     status, summary = replay(published, tmp_path, worse, slower=58.0)

@@ -55,7 +55,7 @@ def _case(states, outputs, seed):
     return records, twin, rng.standard_normal((200, outputs))
 
 
-@pytest.mark.parametrize("states", [2, 3, 5])
+@pytest.mark.parametrize("states", [2, 5])
 def test_scalar_corrections_agree_with_filterpy(states):
     records, twin, measured = _case(states, 2, seed=states)
     twin.R = np.diag(np.diag(twin.R))
@@ -70,7 +70,7 @@ def test_scalar_corrections_agree_with_filterpy(states):
     np.testing.assert_allclose(records["P"][0], twin.P, rtol=1e-9, atol=1e-11)
 
 
-@pytest.mark.parametrize(("states", "outputs"), [(2, 3), (4, 2), (5, 3)])
+@pytest.mark.parametrize(("states", "outputs"), [(2, 3), (5, 2)])
 def test_joint_correction_agrees_with_filterpy(states, outputs):
     records, twin, measured = _case(states, outputs, seed=10 + states)
     distances = np.zeros(len(measured))
