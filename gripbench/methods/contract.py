@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import inspect
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, runtime_checkable
@@ -83,6 +83,9 @@ class CompiledMethod:
         Those of `estimates` for which it also writes `<name>_variance`.
     vehicle_parameters
         Vehicle parameters that it reads.
+    unread
+        `unread(settings) -> names`, or None: those of its vehicle parameters that it does not read
+        under these settings. An instance does not declare them; its step finds NaN in their place.
     parameters
         Its own parameters.
     variants
@@ -109,6 +112,7 @@ class CompiledMethod:
     estimates: ClassVar[tuple[str, ...]]
     variances: ClassVar[tuple[str, ...]] = ()
     vehicle_parameters: tuple[str, ...] = ()
+    unread: ClassVar[Callable[[Mapping[str, Setting]], Collection[str]] | None] = None
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     variants: ClassVar[Mapping[str, Any]] = {}
     printed: ClassVar[str] = ""
@@ -139,6 +143,12 @@ class CompiledMethod:
             self.step = replacing(self.step, chosen.functions, f"{self.name}.{variant}")
             self.files = (*self.files, *_files_of(type(self), chosen))
         self.record_types = _record_types(self)
+        unread = chosen.unread or type(self).unread
+        if unread is not None:
+            names = unread(self.settings)
+            self.vehicle_parameters = tuple(
+                name for name in self.vehicle_parameters if name not in names
+            )
         self._records: drivers.Records | None = None
 
     def reset(self, vehicle: Mapping[str, float], dt: float) -> None:
@@ -184,7 +194,7 @@ class CompiledMethod:
         return (*self.estimates, *(name + VARIANCE for name in self.variances))
 
     def _fresh(self, vehicle: Mapping[str, float], length: int) -> drivers.Records:
-        params = np.zeros(1, self.record_types.params)
+        params = np.full(1, np.nan, self.record_types.params)
         for name, value in require(dict(vehicle), self.vehicle_parameters, self.name).items():
             params[name] = value
         for parameter in self.parameters:

@@ -32,6 +32,7 @@ from gripbench.methods.blocks.axle_friction import (
     axle_slips,
     estimate_friction,
     start_friction,
+    unread_tyre,
 )
 from gripbench.methods.blocks.kalman import correct_scalar, filter_type, predict
 from gripbench.methods.contract import CompiledMethod, Parameter, Variant, compiled
@@ -91,9 +92,10 @@ def measure(kalman, accel_x, wheel_front, wheel_rear, speed, params):
     h[WHEEL_REAR] = 0.0
     h[FORCE_FRONT] = 1.0 / params.mass
     h[FORCE_REAR] = 1.0 / params.mass
-    resistance = params.resistances * (
-        params.rolling_resistance * GRAVITY + params.drag * speed * speed / params.mass
-    )
+    resistance = 0.0
+    if params.resistances > 0.5:
+        resistance = params.rolling_resistance * GRAVITY
+        resistance += params.drag * speed * speed / params.mass
     expected = (x[FORCE_FRONT] + x[FORCE_REAR]) / params.mass - resistance
     correct_scalar(kalman, accel_x - expected, params.acceleration_variance)
 
@@ -137,6 +139,11 @@ def step_printed(state, obs, params, est):
     _step(state, obs, obs.speed_x_rate, params, est)
 
 
+def _unread(settings):
+    resistances = () if settings["resistances"] else RESISTANCE_PARAMETERS
+    return (*unread_tyre(settings), *resistances)
+
+
 class ExtendedKalmanFilter(CompiledMethod):
     """Tyre forces as random-walk states of a Kalman filter of eq. 16."""
 
@@ -159,6 +166,7 @@ class ExtendedKalmanFilter(CompiledMethod):
         "wheel_radius",
         "wheel_inertia",
     )
+    unread = staticmethod(_unread)
     parameters = (
         *AXLE_FRICTION_PARAMETERS,
         Parameter("wheel_speed_density", 20.0, "rad^2/s^3", "Process noise of wheel speeds", 0.0),

@@ -24,6 +24,8 @@ pitch gyroscope between its samples, and a weak roll from the lateral accelerome
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from gripbench.envs.vehicles import GRAVITY
@@ -35,6 +37,7 @@ from gripbench.methods.blocks.kalman import (
     predict_covariance,
 )
 from gripbench.methods.contract import CompiledMethod, Parameter, compiled
+from gripbench.methods.settings import Setting
 
 _DEGREE = np.pi / 180.0
 _PITCH_HISTORY = 2048
@@ -126,6 +129,11 @@ UNGATED = 1e300
 """A gate that lets every finite measurement pass."""
 
 
+def unread_heading(settings: Mapping[str, Setting]) -> tuple[str, ...]:
+    """Return the vehicle parameters that the heading filter does not need."""
+    return () if settings["roll_model"] else HEADING_VEHICLE
+
+
 @compiled
 def west_in_z(north, west, roll):
     """Return the first term of m_z, eq. 6 [T], and its slopes over yaw and roll [T/rad]."""
@@ -196,7 +204,7 @@ def heading_predict(heading, yaw_rate, roll_rate, accel_y, elapsed, params):
     roll = f.x[1]
     turning = yaw_speed(yaw_rate, roll)
     f.x[0] += turning * elapsed
-    sprung = params.roll_model * params.roll_gradient * accel_y
+    sprung = params.roll_gradient * accel_y if params.roll_model > 0.5 else 0.0
     rolling = roll_speed(roll_rate, turning, heading.pitch)
     f.x[1] = sprung + decay * (roll - sprung) + rolling * elapsed
     f.F[0, 0] = 1.0
@@ -374,6 +382,7 @@ class HeadingEkf(CompiledMethod):
     estimates = ("yaw", "roll")
     variances = ("yaw", "roll")
     vehicle_parameters = HEADING_VEHICLE
+    unread = staticmethod(unread_heading)
     parameters = HEADING_PARAMETERS
     variants = {
         "table_1_noise": TABLE_1_NOISE,

@@ -28,6 +28,7 @@ from gripbench.methods.blocks.axle_friction import (
     estimate_friction,
     start_friction,
     total_force,
+    unread_tyre,
 )
 from gripbench.methods.contract import CompiledMethod, Parameter, compiled
 
@@ -83,6 +84,7 @@ class IndividualWheelAcceleration(CompiledMethod):
         "wheel_radius",
         "wheel_inertia",
     )
+    unread = staticmethod(unread_tyre)
     parameters = (
         *AXLE_FRICTION_PARAMETERS,
         Parameter("difference_time", 0.1, "s", "Low-pass of the differenced wheel speeds", 0.0),

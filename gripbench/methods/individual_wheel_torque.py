@@ -27,6 +27,7 @@ from gripbench.methods.blocks.axle_friction import (
     axle_slips,
     estimate_friction,
     start_friction,
+    unread_tyre,
 )
 from gripbench.methods.contract import CompiledMethod, Parameter, compiled
 
@@ -112,6 +113,7 @@ class IndividualWheelTorque(CompiledMethod):
     sensors = ("wheel_speed_front", "wheel_speed_rear", "torque_front", "torque_rear", "speed_gps")
     estimates = ("force_x_front", "force_x_rear", "mu_front", "mu_rear")
     vehicle_parameters = (*AXLE_FRICTION_VEHICLE, "wheel_radius", "wheel_inertia")
+    unread = staticmethod(unread_tyre)
     parameters = (
         *AXLE_FRICTION_PARAMETERS,
         Parameter("wheel_gain", 210.0, "N m s", "Gain l of eq. 21", 0.0),

@@ -35,6 +35,7 @@ from gripbench.methods.heading_ekf import (
     TABLE_1_NOISE,
     UNGATED,
     heading_step,
+    unread_heading,
     wrapped,
     yaw_speed,
 )
@@ -91,6 +92,7 @@ class MagnetometerGpsCascade(CompiledMethod):
     estimates = ("sideslip", "mu", "yaw", "roll", "speed_x", "speed_y")
     variances = ("sideslip", "mu", "yaw", "roll", "speed_x", "speed_y")
     vehicle_parameters = (*HEADING_VEHICLE, *FRICTION_VEHICLE)
+    unread = staticmethod(unread_heading)
     parameters = (*HEADING_PARAMETERS, *SIDESLIP_PARAMETERS, *FRICTION_PARAMETERS)
     variants = {
         "table_1_noise": TABLE_1_NOISE,

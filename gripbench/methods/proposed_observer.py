@@ -46,6 +46,7 @@ from gripbench.methods.blocks.axle_friction import (
     rear_load,
     start_friction,
     total_force,
+    unread_tyre,
 )
 from gripbench.methods.contract import CompiledMethod, Parameter, Variant, compiled
 
@@ -222,6 +223,7 @@ class ProposedObserver(CompiledMethod):
         "wheel_inertia",
         "longitudinal_stiffness",
     )
+    unread = staticmethod(unread_tyre)
     parameters = (
         *AXLE_FRICTION_PARAMETERS,
         Parameter("velocity_gain", 30.0, "-", "Gain K_a of eq. 24", 0.0),

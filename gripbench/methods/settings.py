@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -105,6 +105,9 @@ class Variant:
         Vehicle parameters that it reads instead of the method's.
     functions
         By function of the method: what its step calls instead, at any depth.
+    unread
+        Which vehicle parameters it does not read under its settings, instead of the method's
+        `unread`.
     """
 
     settings: Mapping[str, Setting] = field(default_factory=dict)
@@ -112,6 +115,7 @@ class Variant:
     step: Callable[..., Any] | None = None
     vehicle_parameters: tuple[str, ...] | None = None
     functions: Mapping[Callable[..., Any], Callable[..., Any]] = field(default_factory=dict)
+    unread: Callable[[Mapping[str, Setting]], Collection[str]] | None = None
 
 
 class Variants(Mapping[str, Variant]):

@@ -30,6 +30,7 @@ from gripbench.methods.blocks.axle_friction import (
     rls,
     slip_regressor,
     total_force,
+    unread_tyre,
 )
 from gripbench.methods.contract import CompiledMethod, Parameter, compiled
 
@@ -80,6 +81,7 @@ class SlipSlope(CompiledMethod):
         *TYRE_PARAMETERS,
         "wheel_radius",
     )
+    unread = staticmethod(unread_tyre)
     parameters = (
         *RLS_PARAMETERS,
         *FRICTION_MAP_PARAMETERS,

@@ -11,12 +11,13 @@ and the quotient drifts (the paper has no such gate).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import exp
 
 from gripbench.compilation import inlined
 from gripbench.envs.tyres.longitudinal import magic_formula, slip_ratio
 from gripbench.envs.vehicles import GRAVITY
-from gripbench.methods.settings import Parameter
+from gripbench.methods.settings import Parameter, Setting
 
 AXLE_LOAD_PARAMETERS = ("mass", "cg_to_front", "cg_to_rear")
 RESISTANCE_PARAMETERS = ("rolling_resistance", "drag")
@@ -59,6 +60,13 @@ MAGIC_FORMULA = {"tyre_shape": True, "slope_gain": 1.0}
 AXLE_FRICTION_PARAMETERS = (*RLS_PARAMETERS, *FRICTION_MAP_PARAMETERS)
 AXLE_FRICTION_STATE = ("slope_front", "covariance_front", "slope_rear", "covariance_rear")
 AXLE_FRICTION_VEHICLE = (*AXLE_LOAD_PARAMETERS, *TYRE_PARAMETERS)
+
+
+def unread_tyre(settings: Mapping[str, Setting]) -> tuple[str, ...]:
+    """Return the tyre's parameters that the map of these settings does not need."""
+    if settings["tyre_shape"]:
+        return ()
+    return TYRE_PARAMETERS if settings["slope_gain"] else ("magic_e",)
 
 
 @inlined

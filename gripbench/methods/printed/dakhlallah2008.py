@@ -58,13 +58,22 @@ def printed_step_and_update(state, obs, params, elapsed):
         euler_step(state, obs, params, elapsed)
 
 
+def _unread(settings):
+    # neither the forecast nor its covariance counts, so the yaw model is without effect
+    return ("yaw_inertia",) if settings["correction"] else ()
+
+
 _SLIPS = {dugoff_slips: printed_slips}
 _JACOBIAN = {transition: printed_transition}
 _TRACK = {"load_transfer_track": 0.5}
 
 FORMS = {
     "dugoff_ekf": {
-        "paper": Variant(_TRACK, functions=_SLIPS | _JACOBIAN | {advance: printed_step_and_update}),
+        "paper": Variant(
+            _TRACK,
+            functions=_SLIPS | _JACOBIAN | {advance: printed_step_and_update},
+            unread=_unread,
+        ),
         "paper_step": Variant(functions={advance: euler_step}),
         "paper_slip": Variant(functions=_SLIPS),
         "paper_load_transfer": Variant(_TRACK),
