@@ -32,6 +32,10 @@ from gripbench.methods.blocks.single_track_filter import (
 )
 from gripbench.methods.contract import CompiledMethod, Parameter, Variant, compiled
 
+# the steady turn of the model knows no moment of inertia
+_VEHICLE = tuple(name for name in SINGLE_TRACK_VEHICLE if name != "yaw_inertia")
+_FUSED_VEHICLE = tuple(name for name in FUSED_VEHICLE if name != "yaw_inertia")
+
 _STATE = np.dtype([("inputs", INPUT_STATE), ("filter", filter_type(2)), ("deviation", np.float64)])
 
 
@@ -90,7 +94,7 @@ class KinematicObserver(CompiledMethod):
     sensors = FUSED_SENSORS
     estimates = LATERAL_ESTIMATES
     variances = LATERAL_VARIANCES
-    vehicle_parameters = FUSED_VEHICLE
+    vehicle_parameters = _FUSED_VEHICLE
     parameters = (
         *FUSED_PARAMETERS,
         Parameter("pseudo_noise", 0.005, "rad sqrt(s)", "Density of the model's error", 1e-5, 1.0),
@@ -101,11 +105,9 @@ class KinematicObserver(CompiledMethod):
     )
     variants = {
         "measured_speed": Variant(
-            sensors=MEASURED_SENSORS, step=_step_measured, vehicle_parameters=SINGLE_TRACK_VEHICLE
+            sensors=MEASURED_SENSORS, step=_step_measured, vehicle_parameters=_VEHICLE
         ),
-        "gps_speed": Variant(
-            sensors=GPS_SENSORS, step=_step_gps, vehicle_parameters=SINGLE_TRACK_VEHICLE
-        ),
+        "gps_speed": Variant(sensors=GPS_SENSORS, step=_step_gps, vehicle_parameters=_VEHICLE),
     }
     state = _STATE
     step = staticmethod(_step)
