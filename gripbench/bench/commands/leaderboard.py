@@ -65,7 +65,9 @@ def leaderboard(
     from gripbench.bench.publishing.tables import format_of, markdown, render, show
     from gripbench.bench.publishing.timings import read_timings
     from gripbench.bench.ranking.answers import answers
+    from gripbench.bench.ranking.degradation import without_faults
     from gripbench.bench.running.store import read_rows
+    from gripbench.envs.instruments.faults import split_faults
     from gripbench.errors import InputError, unknown
     from gripbench.writing import check_writable, write_atomically
 
@@ -75,7 +77,9 @@ def leaderboard(
         check_writable(report)
     suites = [load_suite(name) for name in suite or ()]
     names = [find_scenario(item).name for each in suites for item in each.names()]
-    rows = read_rows(results, tuple(names) if suite else ())
+    rows = read_rows(results)
+    if suite:
+        rows = rows[rows["scenario"].map(lambda name: split_faults(name)[0]).isin(names)]
     if rows.empty:
         raise InputError(f"{results}: no stored rows to rank; 'gripbench run' makes them")
     known = set(rows["target"])
@@ -85,7 +89,8 @@ def leaderboard(
     named = known & set(target or (name for each in suites for name in each.targets))
     targets = named or usual_targets(rows)
     if answer:
-        print(markdown(answer_table(answers(rows, targets or sorted(known - {""})))), end="")
+        clean = without_faults(rows)
+        print(markdown(answer_table(answers(clean, targets or sorted(known - {""})))), end="")
         return
     relative = read_timings(timings) if timings else None
     current, boards = build(rows, relative, confidence, targets)

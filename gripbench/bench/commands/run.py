@@ -12,6 +12,9 @@ from typer.core import TyperCommand
 from gripbench.bench.commands import RUN
 from gripbench.bench.running.store import DEFAULT_RESULTS
 
+MOST_LINES = 40
+"""Lines of methods and faults up to which `--faults` prints each of them."""
+
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
@@ -99,14 +102,15 @@ def run(
 ) -> None:
     """Run methods on scenarios and print their RMS errors; what is stored is not run again."""
     from gripbench.bench.catalogue.suites import load_suite
-    from gripbench.bench.publishing.degradation_table import print_degradation
+    from gripbench.bench.publishing.degradation_table import degradation_tables, every_line
     from gripbench.bench.publishing.presentation import (
         console,
         print_failures,
         print_summary,
         progress,
     )
-    from gripbench.bench.ranking.degradation import degradation
+    from gripbench.bench.publishing.tables import show
+    from gripbench.bench.ranking.degradation import degradation, without_faults
     from gripbench.bench.ranking.summary import scores_csv, summary
     from gripbench.bench.running.api import limits_of, order_in, plan_of
     from gripbench.bench.running.backends import Backend
@@ -148,9 +152,14 @@ def run(
             raise InterruptionError(str(error)) from None
     frame = frame_of(sorted(rows, key=order_in(plan)))
     shown = frame[frame["target"].isin([*targets, ""])] if targets else frame
-    print_summary(summary(shown))
+    print_summary(summary(without_faults(shown)))
     if faults:
-        print_degradation(degradation(shown))
+        damage = degradation(shown)
+        for table in degradation_tables(damage):
+            show(table)
+        for name, part in damage.groupby("target", sort=False):
+            if len(part) <= MOST_LINES:
+                show(every_line(damage, str(name)))
     print_failures(frame)
     for label, words in untracked(rows).items():
         console().print(

@@ -20,9 +20,11 @@ import gripbench
 from gripbench.bench.catalogue.suites import load_suite, suite_files
 from gripbench.bench.publishing.board_tables import Timings, answer_table, board_table
 from gripbench.bench.publishing.columns import Table
+from gripbench.bench.publishing.degradation_table import degradation_tables
 from gripbench.bench.publishing.tables import markdown
 from gripbench.bench.publishing.timings import RelativeRuntime
 from gripbench.bench.ranking.answers import Answer, answers, words
+from gripbench.bench.ranking.degradation import degradation, without_faults
 from gripbench.bench.ranking.grids import ANY, opening
 from gripbench.bench.ranking.plans import setting_of, standing_of
 from gripbench.bench.ranking.ranking import Board, boards
@@ -73,6 +75,9 @@ class Leaderboard(Configuration):
     boards
         Each board: target, sensors, title, scenarios, seeds, notes, and its `methods`, one
         mapping a line with the columns of `gripbench.bench.ranking.ranking.columns`.
+    faults
+        What each fault does to each method: the columns of
+        `gripbench.bench.ranking.degradation.COLUMNS`.
     runtimes
         Relative runtimes by label and form; empty without timings.
     runs
@@ -84,6 +89,7 @@ class Leaderboard(Configuration):
     confidence: float
     answers: tuple[dict[str, Any], ...] = ()
     boards: tuple[dict[str, Any], ...]
+    faults: tuple[dict[str, Any], ...] = ()
     runtimes: dict[str, dict[str, RelativeRuntime]] = Field(default_factory=dict)
     runs: tuple[Runs, ...]
 
@@ -132,6 +138,8 @@ def build(
     """
     chosen = set(targets) or set(rows["target"])
     rows = rows[rows["target"].isin(chosen)]
+    damage = degradation(rows)
+    rows = without_faults(rows)
     found = boards(rows, confidence=confidence)
     for target in dict.fromkeys(board.target for board in found):
         if len({board.sensors for board in found if board.target == target}) > 1:
@@ -146,6 +154,7 @@ def build(
                 for one in answers(rows, sorted(set(rows["target"]) - {""}))
             ),
             boards=tuple(_content(board) for board in found),
+            faults=tuple(_lines(damage)),
             runtimes={label: dict(forms) for label, forms in (timings or {}).items()},
             runs=tuple(runs_of(rows)),
         ),
@@ -154,7 +163,7 @@ def build(
 
 
 def write(folder: Path, leaderboard: Leaderboard, found: list[Board]) -> list[Path]:
-    """Write leaderboard.md, .csv and .json, and return their paths.
+    """Write leaderboard.md, .csv and .json, with faults also faults.csv, and return their paths.
 
     Raises
     ------
@@ -166,6 +175,9 @@ def write(folder: Path, leaderboard: Leaderboard, found: list[Board]) -> list[Pa
         "leaderboard.csv": _csv(leaderboard, found),
         "leaderboard.json": _json(leaderboard.model_dump()),
     }
+    if leaderboard.faults:
+        frame = pd.DataFrame(leaderboard.faults)
+        texts["faults.csv"] = frame.to_csv(index=False, lineterminator="\n")
     for name, text in texts.items():
         write_atomically(folder / name, text)
     return [folder / name for name in texts]
@@ -227,6 +239,12 @@ def text_of(leaderboard: Leaderboard, found: list[Board]) -> str:
             before = setting
         table = _without_caption(board_table(board, leaderboard.runtimes or None))
         parts += [f"## {board.title}", "", f"**{words(board)}**", "", table, ""]
+    if leaderboard.faults:
+        parts += ["# Faults of the instruments", ""]
+        damage = pd.DataFrame(leaderboard.faults)
+        damage["recovery"] = damage["recovery"].fillna(math.inf).where(damage["recovered"].notna())
+        for each in degradation_tables(damage):
+            parts += [f"## {each.caption}", "", _without_caption(each), ""]
     return "\n".join(parts).rstrip() + "\n"
 
 
@@ -273,11 +291,15 @@ def _content(board: Board) -> dict[str, Any]:
         "scenarios": list(board.scenarios),
         "seeds": list(board.seeds),
         "notes": list(board.notes),
-        "methods": [
-            {str(key): _plain(value) for key, value in line.items()}
-            for line in board.lines.to_dict("records")
-        ],
+        "methods": _lines(board.lines),
     }
+
+
+def _lines(frame: pd.DataFrame) -> list[dict[str, Any]]:
+    return [
+        {str(key): _plain(value) for key, value in line.items()}
+        for line in frame.to_dict("records")
+    ]
 
 
 def _plain(value: Any) -> Any:

@@ -7,6 +7,8 @@ pairs count.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
+from functools import cache
 
 import numpy as np
 import pandas as pd
@@ -25,10 +27,11 @@ def degradation(frame: pd.DataFrame) -> pd.DataFrame:
 
     Returns
     -------
-    Columns `target, label, fault, pairs, ratio, recovery, lost`: number of pairs, geometric mean
-    over scenarios of the RMS error over that of the clean twins, median time [s] from the fault's
-    end until the error is again what it is without (inf: not within the run), and runs that fail
-    with the fault but not without.
+    Columns `target, label, fault, kind, severity, pairs, ratio, recovered, recovery, lost`: the
+    fault as it was named, its kind and severity (0 where several act together), number of pairs,
+    geometric mean over scenarios of the RMS error over that of the clean twins, share of the runs
+    in which the error becomes again what it is without, median time [s] from the fault's end until
+    then (inf: not within the run), and runs that fail with the fault but not without.
     """
     plain = frame.assign(
         clean=[split_faults(name)[0] for name in frame["scenario"]],
@@ -56,18 +59,48 @@ def degradation(frame: pd.DataFrame) -> pd.DataFrame:
                 "target": target,
                 "label": label,
                 "fault": fault,
+                **_kind(str(fault)),
                 "pairs": len(part),
-                "ratio": _geometric_mean(ratios),
+                "ratio": geometric_mean(ratios),
+                "recovered": float(np.isfinite(times).mean()) if len(times) else math.nan,
                 "recovery": float(times.median()) if len(times) else math.nan,
                 "lost": int(lost.sum()),
             }
         )
-    columns = ["target", "label", "fault", "pairs", "ratio", "recovery", "lost"]
-    return pd.DataFrame(lines, columns=columns)
+    return pd.DataFrame(lines, columns=COLUMNS)
 
 
-def _geometric_mean(ratios: list[float]) -> float:
-    if not ratios:
+COLUMNS = [
+    "target", "label", "fault", "kind", "severity", "pairs", "ratio", "recovered", "recovery",
+    "lost",
+]  # fmt: skip
+"""Of the table of degradation."""
+
+
+def without_faults(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows of runs without faults; all of them where every run has one."""
+    clean = ~rows["scenario"].map(_is_faulty).astype(bool)
+    return rows[clean] if clean.any() else rows
+
+
+@cache
+def _is_faulty(scenario: str) -> bool:
+    return bool(split_faults(scenario)[1])
+
+
+def _kind(fault: str) -> dict[str, str | int]:
+    """Return kind and severity of a fault; the channel belongs to the kind."""
+    if "+" in fault:
+        return {"kind": fault, "severity": 0}
+    name, severity, *channel = fault.split(":")
+    return {"kind": ":".join((name, *channel)), "severity": int(severity)}
+
+
+def geometric_mean(ratios: Iterable[float]) -> float:
+    """Return the geometric mean of what is known; NaN where nothing is."""
+    known = np.asarray(list(ratios), float)
+    known = known[~np.isnan(known)]
+    if not len(known):
         return math.nan
     with np.errstate(divide="ignore"):
-        return float(np.exp(np.mean(np.log(ratios))))
+        return float(np.exp(np.log(known).mean()))

@@ -20,6 +20,7 @@ import numpy.typing as npt
 import pandas as pd
 
 from gripbench.bench.ranking import statistics
+from gripbench.bench.ranking.degradation import without_faults
 from gripbench.bench.ranking.grids import (
     ANY,
     Grid,
@@ -181,7 +182,7 @@ def boards(
     """Return the boards behind `rank`, with their comparisons; parameters and errors as there."""
     if not 0.5 <= confidence < 1.0:
         raise InputError(f"confidence is {confidence:g}; it must be from 0.5 to below 1")
-    rows = _only(_only(rows, "scenario", scenarios), "label", labels)
+    rows = without_faults(_only(_only(rows, "scenario", scenarios), "label", labels))
     targets = [target] if isinstance(target, str) else list(target)
     known = [str(name) for name in rows["target"].unique() if name]
     for name in targets:

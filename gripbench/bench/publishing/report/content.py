@@ -27,6 +27,7 @@ from gripbench.bench.ranking.ranking import Board, boards
 from gripbench.bench.ranking.resolution import resolution
 from gripbench.bench.ranking.statistics import performance_profile
 from gripbench.bench.ranking.summary import failures, marked, summary
+from gripbench.envs.instruments.faults import split_faults
 from gripbench.envs.signals import signal
 from gripbench.errors import InputError
 
@@ -72,7 +73,7 @@ def chosen_targets(rows: pd.DataFrame, suites: Sequence[str] = ()) -> tuple[str,
     Without such a suite it is every target that two methods or more estimate, or else every one.
     """
     present = [str(name) for name in rows["target"].unique() if name]
-    scenarios = set(rows["scenario"])
+    scenarios = {split_faults(name)[0] for name in rows["scenario"].unique()}
     wanted: dict[str, None] = {}
     for name in suites or suite_files():
         suite = load_suite(name)
@@ -97,10 +98,11 @@ def rows_of_suites(rows: pd.DataFrame, suites: Sequence[str]) -> pd.DataFrame:
     if not suites:
         return rows
     keep = pd.Series(False, index=rows.index)
+    clean = rows["scenario"].map(lambda name: split_faults(name)[0])
     for name in suites:
         suite = load_suite(name)
         labels = {spec.label for spec in suite.specs()}
-        part = rows["scenario"].isin(suite.names()) & rows["label"].isin(labels)
+        part = clean.isin(suite.names()) & rows["label"].isin(labels)
         if not part.any():
             raise InputError(
                 f"no stored row of suite '{name}': gripbench run --suite {name} makes them"

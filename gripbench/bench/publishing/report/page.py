@@ -16,6 +16,8 @@ import gripbench
 from gripbench.bench.catalogue.registry import choose_method
 from gripbench.bench.publishing import tables
 from gripbench.bench.publishing.board_tables import answer_table
+from gripbench.bench.publishing.columns import Table
+from gripbench.bench.publishing.degradation_table import degradation_tables, every_line
 from gripbench.bench.publishing.figures.style import SERIES
 from gripbench.bench.publishing.manifest import commit
 from gripbench.bench.publishing.report.content import (
@@ -36,6 +38,7 @@ from gripbench.bench.publishing.report.content import (
 from gripbench.bench.publishing.report.critical import critical_differences
 from gripbench.bench.publishing.report.series import POINTS, SeriesPlan, all_series
 from gripbench.bench.ranking.answers import answers
+from gripbench.bench.ranking.degradation import degradation, without_faults
 from gripbench.bench.ranking.plans import plan_of, setting_of
 from gripbench.bench.ranking.ranking import Board
 from gripbench.bench.ranking.summary import not_run
@@ -97,7 +100,7 @@ def write_report(
     rows = rows_of_suites(rows, suites)
     chosen = tuple(targets) or chosen_targets(rows, suites)
     own = {choose_method(method).label: method for method in methods}
-    plans = series_plans(rows, chosen, shown_seeds, band_seeds, own)
+    plans = series_plans(without_faults(rows), chosen, shown_seeds, band_seeds, own)
     done = 0
 
     def count() -> None:
@@ -152,6 +155,8 @@ def page(
     results
         Folder in which reproductions and manifests are looked for.
     """
+    damage = degradation(rows[rows["target"].isin(targets)])
+    rows = without_faults(rows)
     absent = not_run(rows)
     if len(absent) < rows["scenario"].nunique():
         rows = rows[~rows["scenario"].isin(absent)]
@@ -180,6 +185,7 @@ def page(
         "summary": _summary(rows, targets),
         "boards": "\n".join(_board(board) for board in found),
         "critical": "\n".join(critical_differences(board) for board in whole.values()),
+        "faults": _faults(damage),
         "papers": _papers(paper_results(results)),
         "failures": _failures(rows) + _notes(absent),
         "manifest": _manifest(manifests(results)),
@@ -258,6 +264,27 @@ def _answers(rows: pd.DataFrame, targets: Sequence[str]) -> str:
     return (
         '<div class="scroll" tabindex="0" role="region" '
         f'aria-label="Which method for which road and sensors">\n{found}</div>'
+    )
+
+
+def _faults(damage: pd.DataFrame) -> str:
+    if damage.empty:
+        return (
+            "<p>No run with a fault lies in this results folder: "
+            "<code>gripbench run --suite lateral_population --faults</code> makes them.</p>"
+        )
+    parts = [_scrolled(table) for table in degradation_tables(damage)]
+    for target in damage["target"].unique():
+        table = every_line(damage, str(target))
+        summary = html.escape(table.caption)
+        parts.append(f"<details><summary>{summary}</summary>{_scrolled(table)}</details>")
+    return "\n".join(parts)
+
+
+def _scrolled(table: Table) -> str:
+    return (
+        f'<div class="scroll" tabindex="0" role="region" aria-label="{html.escape(table.caption)}">'
+        f"\n{tables.html(table)}</div>"
     )
 
 
