@@ -13,8 +13,8 @@ from scipy.io import savemat
 from gripbench.envs.recordings import Recording
 from gripbench.envs.signals import NEW, signal
 from gripbench.errors import InputError
-from gripbench.logs.channel_map import ChannelMap
-from gripbench.logs.log import optional
+from gripbench.logs.mapping.channel_map import ChannelMap
+from gripbench.logs.readers.log import optional
 from gripbench.writing import being_written
 
 _TRUTH = "truth_"

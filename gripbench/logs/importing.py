@@ -22,17 +22,17 @@ from gripbench.envs.recordings import Recording
 from gripbench.envs.signals import NEW, record_type
 from gripbench.envs.vehicles import CarOnPaper
 from gripbench.errors import InputError
-from gripbench.logs.channel_map import ChannelMap, LogFile, load_channel_map, vehicle_values
-from gripbench.logs.derivation import derive_channels, derive_reference
-from gripbench.logs.geometry import SAE_TURNED, levelled, placed
-from gripbench.logs.initial import zeroed
-from gripbench.logs.laws import speed_of
-from gripbench.logs.log import Log, LogColumn, log_of_frame
-from gripbench.logs.map_tables import Column
-from gripbench.logs.quality import QualityReport, judge
-from gripbench.logs.readers import read_log
-from gripbench.logs.series import Floats, Series, series_of, wrapped
-from gripbench.logs.sources import add_sources
+from gripbench.logs.channels.derivation import derive_channels, derive_reference
+from gripbench.logs.channels.geometry import SAE_TURNED, levelled, placed
+from gripbench.logs.channels.initial import zeroed
+from gripbench.logs.channels.series import Floats, Series, series_of, wrapped
+from gripbench.logs.channels.sources import add_sources
+from gripbench.logs.mapping.channel_map import ChannelMap, LogFile, load_channel_map, vehicle_values
+from gripbench.logs.mapping.map_tables import Column
+from gripbench.logs.quality.report import QualityReport, judge
+from gripbench.logs.quality.speeds import speed_of
+from gripbench.logs.readers.log import Log, LogColumn, log_of_frame
+from gripbench.logs.readers.reading import read_log
 from gripbench.logs.windows import check_windows, placed_bound, placed_windows
 
 _MAXIMUM_GAP = 3.0  # reference samples further apart than this many median intervals leave a hole
@@ -65,7 +65,7 @@ class Provenance:
     gripbench: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ImportedLog:
     """The recordings of a log, one a run, with what was found about them."""
 

@@ -25,3 +25,9 @@ def data_folder(setting: Path | None = None) -> Path:
         return Path(named)
     base = os.environ.get("XDG_DATA_HOME", "")
     return (Path(base) if base else Path.home() / ".local" / "share") / "gripbench" / "data"
+
+
+def use_data_folder(folder: Path | None) -> None:
+    """Look there in this process and those that it starts; None: stay where it is."""
+    if folder is not None:
+        os.environ[VARIABLE] = str(folder.absolute())

@@ -6,9 +6,9 @@ from pathlib import Path
 
 from gripbench.configuration import CONFIGS
 from gripbench.errors import InputError, unknown
-from gripbench.logs.channel_map import load_channel_map
 from gripbench.logs.importing import ImportedLog, import_log
 from gripbench.logs.locations import VARIABLE, data_folder
+from gripbench.logs.mapping.channel_map import load_channel_map
 
 
 class AbsentDataError(InputError):

@@ -19,7 +19,7 @@ from gripbench.envs.signals import record_type
 from gripbench.envs.vehicles import CarOnPaper
 from gripbench.errors import GripbenchError, InputError
 from gripbench.logs.importing import ImportedLog, Provenance
-from gripbench.logs.quality import Finding, QualityReport
+from gripbench.logs.quality.report import Finding, QualityReport
 
 SCHEMA = 1
 """Version of the layout; a later version keeps reading the earlier ones."""

@@ -13,13 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 from gripbench.envs.recordings import Bounds, Recording
-from gripbench.envs.signals import NEW
 from gripbench.errors import InputError
-from gripbench.logs.channel_map import Bound, ChannelMap
-from gripbench.logs.map_tables import Intervals
-
-_LONGEST = 10.0
-"""Mean distances between rows that a row stands for at most."""
+from gripbench.logs.coverage import too_little
+from gripbench.logs.mapping.channel_map import Bound, ChannelMap
+from gripbench.logs.mapping.interval_tables import Intervals
 
 _EDGE = 1.5
 """Mean distances between rows by which an interval may reach beyond the first or last row."""
@@ -103,7 +100,9 @@ def check_windows(channel_map: ChannelMap, recordings: Sequence[Recording]) -> N
                 if high <= 0.0 or low >= end:
                     continue
                 held = True
-                _check_known(channel_map, recording, key, (low, high), origin)
+                error = too_little(recording, (low, high), windows.covered, key)
+                if error is not None:
+                    raise error
             if not held:
                 first = recordings[0]
                 origin = 0.0 if windows.from_start else first.notes["time_origin"]
@@ -127,35 +126,6 @@ def check_windows(channel_map: ChannelMap, recordings: Sequence[Recording]) -> N
                 end = float(recordings[-1].observations["time"][-1])
                 times = (bound.start or 0.0, bound.end or np.inf)
                 raise _outside(f"bounds.{signal}[{index}]", times, origin, end, windows.from_start)
-
-
-def _check_known(
-    channel_map: ChannelMap,
-    recording: Recording,
-    key: str,
-    interval: tuple[float, float],
-    origin: float,
-) -> None:
-    low, high = interval
-    time, truth = recording.truth["time"], recording.truth
-    longest = _LONGEST * float(time[-1]) / (len(time) - 1)
-    worth = np.minimum(np.diff(time, append=time[-1] + longest / _LONGEST), longest)
-    inside = (time >= low) & (time <= high) & (time >= recording.score_from)
-    signals = [name for name in truth.dtype.names or () if name != "time" and NEW not in name]
-    judged: list[tuple[str, npt.NDArray[np.bool_]]] = [("row", inside)]
-    judged += [(f"reference '{name}'", inside & np.isfinite(truth[name])) for name in signals]
-    least = channel_map.windows.covered
-    for what, known in judged:
-        share = min(float(worth[known].sum()) / (high - low), 1.0)
-        if share < least or not known.any():
-            later = recording.score_from > low and not what.startswith("reference")
-            cause = f"; score_from leaves out the first {recording.score_from:g} s" if later else ""
-            raise InputError(
-                f"{recording.scenario}: key '{key}': {low + origin:.3f} to {high + origin:.3f} s "
-                f"has {int(known.sum())} samples with a {what}, {100.0 * share:.0f} % of its time, "
-                f"fewer than asked for{cause}; choose another interval, or set windows.covered "
-                f"below {least:g}"
-            )
 
 
 def _outside(

@@ -34,12 +34,23 @@ def test_the_words_name_method_error_next_and_guess():
     assert said.endswith("No better than a guess: c.")
 
 
+def test_methods_that_the_runs_do_not_tell_apart_are_named():
+    board = boards(noisy_frame({"a": 1.0, "b": 1.0, "c": 1.0, "d": 9.0}))[0]
+    first, *_ = board.lines["label"]
+    alike = [name for name in board.lines["label"][:3] if name != first]
+    assert f"do not tell it apart from {alike[0]} or {alike[1]}." in words(board)
+    clear = boards(noisy_frame({"a": 1.0, "b": 2.0}))[0]
+    assert "tell it apart" not in words(clear)
+
+
 def test_a_best_method_that_is_no_better_than_a_guess_is_called_so():
     board = boards(noisy_frame({"a": 3.0, "b": 4.0, "guess": 1.0}, **GUESS))[0]
-    assert "It is no better than a guess: guess is as good." in words(board)
+    said = words(board)
+    assert f"With {board.lines['sensors'][0]} no method is better than the guess guess: " in said
+    assert "The best of them is a: " in said
     (answer,) = answers(noisy_frame({"a": 3.0, "b": 4.0, "guess": 1.0}, **GUESS), ["mu_front"])
     assert not answer.useful
-    assert "none: guess is as good as a" in plain(answer_table([answer]))
+    assert "none is better than guess; best: a" in plain(answer_table([answer]))
 
 
 def test_sensors_stand_where_they_change_the_method_and_idealised_ones_never():

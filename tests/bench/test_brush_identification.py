@@ -6,31 +6,35 @@ import pytest
 from gripbench.bench.papers.yoon2015.brush_identification import (
     PARAMETERS,
     LateralTest,
-    brush_lateral_force,
     identify,
     modelled_acceleration,
     separability,
 )
 from gripbench.errors import InputError
-from gripbench.methods.friction_ekf import brush_force
+from gripbench.logs.vehicle.brush_fit import brush_force
+from gripbench.methods.friction_ekf import brush_force as force_of_filter
 
 VEHICLE = {"mass": 2450.0, "cg_to_front": 1.573, "cg_to_rear": 2.085}
 TRUE = np.array([100e3, 94e3, 0.25])
 
 
-def synthetic(seed, n=400, noise=0.1, size=0.15, bias=0.1):
+def synthetic(seed, n=400, noise=0.1, size=0.15, bias=0.1, memory=0.0):
     rng = np.random.default_rng(seed)
     t = np.linspace(0.0, 20.0, n)
     slips = size * np.sin(0.7 * t), 0.9 * size * np.sin(0.7 * t - 0.3)
     test = LateralTest(*slips, 0.1 * np.sin(0.7 * t), np.zeros(n))
-    accel = modelled_acceleration(test, VEHICLE, TRUE) + bias + noise * rng.normal(size=n)
+    accel = modelled_acceleration(test, VEHICLE, TRUE) + bias
+    errors = rng.normal(size=n)
+    for k in range(1, n):
+        errors[k] = memory * errors[k - 1] + np.sqrt(1.0 - memory**2) * errors[k]
+    accel += noise * errors
     return LateralTest(test.slip_front, test.slip_rear, test.steer, accel)
 
 
 def test_force_is_that_of_the_filter():
     angles = np.linspace(-0.5, 0.5, 41)
-    ours = brush_lateral_force(angles, 0.3, 6e3, 5e4)
-    filters = [brush_force(angle, 0.3, 6e3, 5e4)[0] for angle in angles]
+    ours = brush_force(angles, 5e4, 0.3 * 6e3)
+    filters = [force_of_filter(angle, 0.3, 6e3, 5e4)[0] for angle in angles]
     np.testing.assert_allclose(ours, filters, rtol=1e-12, atol=1e-9)
 
 
@@ -41,11 +45,12 @@ def test_exact_data_give_the_exact_tyre():
     assert found.residual_rms < 1e-6
 
 
-def test_uncertainty_covers_the_error():
+@pytest.mark.parametrize("memory", [0.0, 0.7])
+def test_uncertainty_covers_the_error(memory):
     """Over 40 noise seeds the normalised errors have the spread of a standard normal."""
     normalised = []
     for seed in range(40):
-        found = identify([synthetic(seed)], VEHICLE)
+        found = identify([synthetic(seed, memory=memory)], VEHICLE)
         normalised.append(
             [
                 (found.values[name] - true) / found.standard_deviations[name]

@@ -189,7 +189,7 @@ def test_a_plot_of_a_method_without_its_sensors_says_so(runs):
 
 
 def test_a_part_behind_the_end_of_the_run_is_refused(runs):
-    with pytest.raises(InputError, match="it runs to 30 s"):
+    with pytest.raises(InputError, match="seed 0 runs from 0 to 30 s"):
         run_plot(runs, STEP, [], "mu_front", start=31.0)
 
 

@@ -60,17 +60,21 @@ def test_data_path(tmp_path, monkeypatch):
     assert "no such folder" in _run("data", "path", "--folder", missing).stdout
 
 
-def test_recordings_without_data_say_where_to_get_it(tmp_path):
+def test_recordings_without_data_say_where_to_get_it(tmp_path, monkeypatch):
+    monkeypatch.setenv("GRIPBENCH_DATA", "")  # --data sets it
+    monkeypatch.chdir(tmp_path)
     result = _run("recordings", "f1tenth_optitrack", "--data", tmp_path)
     assert result.exit_code == 0
     assert "get it from" in result.output
 
 
-def test_own_log_from_import_to_scores(log, tmp_path):
+def test_own_log_from_import_to_scores(log, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     text = _run("import", log, "--inspect").stdout
     text += '\n[reference.sideslip]\ncolumn = "acc_right_g"\nunit = "deg"\n'
     (tmp_path / "map.toml").write_text(text)
     _run("import", log, "--map", tmp_path / "map.toml", "--out", tmp_path / "kept")
-    result = _run("recordings", tmp_path / "kept" / "drive", "--method", "kinematic_kalman_filter")
-    assert "zero sideslip" in result.output
+    methods = ("--method", "kinematic_kalman_filter", "--method", "zero_sideslip")
+    result = _run("recordings", tmp_path / "kept" / "drive", *methods, "--workers", 1)
+    assert "zero_sideslip" in result.output
     assert "no sensor for 'course'" in result.output

@@ -1,5 +1,6 @@
 """A log of one's own, by folder, name and map: identify, tune, run, rank, plot, report, study."""
 
+import html
 import tomllib
 
 import numpy as np
@@ -10,8 +11,12 @@ from typer.testing import CliRunner
 import gripbench
 from gripbench.bench.catalogue.registry import choose_method
 from gripbench.bench.command_line import application
+from gripbench.bench.publishing.figures.run_plot import run_plot
+from gripbench.bench.publishing.figures.runs import Runs
+from gripbench.bench.publishing.report.series import SeriesPlan, series_of, unpacked
 from gripbench.bench.running import cells
 from gripbench.bench.running.recorded_scenarios import recorded_scenario, recording_of
+from gripbench.bench.scoring.metric import pooled_rms
 
 FRONT, REAR, MASS, INERTIA = 1.2, 1.5, 1500.0, 2500.0
 MAP = """
@@ -164,3 +169,62 @@ def test_all_that_is_missing_to_identify_is_named_at_once(here):
     said = f"{result.output} {result.exception}"
     for part in ("steer_angle", "cg_to_front", "cg_to_rear", "no window 'train'"):
         assert part in said
+
+
+def test_every_output_says_which_window_was_scored(here):
+    whole = "120.000 to 139.900 s of the log's own clock, 7 windows"
+    arguments = ("--method", METHOD, "--method", "zero_sideslip", "--workers", 1)
+    printed = _call("run", "--recording", "map.toml", *arguments)
+    assert f"scored of recording:my_drive: {whole}" in printed
+    ranked = _call("rank", "--target", "sideslip", "--sensors", "any", "--format", "text")
+    assert f"Scored: {whole}." in ranked
+    assert "over 7 windows of one drive" in ranked
+    place = "recording:map.toml"
+    assert "Written" in _call("plot", place, "--methods", METHOD, "--seed", 2)
+    figure = run_plot(Runs(), place, [METHOD], "sideslip", 2)
+    assert figure.get_suptitle().endswith("run 0, 125.686 to 128.529 s of the log's clock")
+    low, high = figure.axes[0].get_xlim()
+    assert (low, high) == pytest.approx((125.69, 128.52), abs=0.011)
+    series = series_of(SeriesPlan(place, {"sideslip": (METHOD,)}, (2,), (0, 1, 2)))
+    assert series["windows"]["2"] == {"run": 0, "start": 125.685714, "end": 128.528571}
+    assert series["band_seeds"] == 0
+    times = unpacked(series["time"])
+    assert (times[0], times[-1]) == pytest.approx((0.0, 128.528571 - 125.685714), abs=1e-3)
+    assert np.isfinite(unpacked(series["estimates"]["sideslip"][METHOD]["2"])).all()
+    _call("report", "--recording", "map.toml", "--output", "report.html", "--workers", 1)
+    page = (here / "report.html").read_text()
+    assert html.escape(whole) in page
+    assert '"windows":{"0":{"run":0,"start":120.0,' in page
+
+
+def test_sensitivity_of_a_recording_is_what_methods_are_told_of_the_car(here):
+    place = ("--scenario", "recording:map.toml", "--target", "sideslip", "--workers", 1)
+    said = _call("sensitivity", METHOD, *place, "--cause", "paper.mass", "--export", "out.csv")
+    assert "paper.mass" in said
+    lines = pd.read_csv(here / "out.csv").set_index(["label", "cause", "multiple"])["rms"]
+    light, heavy = (lines[METHOD, "paper.mass", size] for size in (-1.0, 1.0))
+    assert light != heavy
+    whole = lines[METHOD, "paper.mass", 0.0]
+    rows = gripbench.run(scenarios=["recording:map.toml"], methods=[METHOD], results="r", workers=1)
+    part = rows[rows["target"] == "sideslip"]
+    pooled = pooled_rms(part["sum_of_squares"], part["count"])
+    assert whole == pytest.approx(pooled, rel=1e-5)
+    result = CliRunner().invoke(
+        application(), ["sensitivity", METHOD, *map(str, place), "--cause", "mass"]
+    )
+    assert "of a recording are what they were" in str(result.exception)
+
+
+def test_inspection_proposes_a_car_and_says_what_runs_and_what_more_would_need(here):
+    result = CliRunner().invoke(application(), ["import", "--inspect", "map.csv"])
+    proposal = tomllib.loads(result.stdout)
+    assert set(proposal["vehicle"]) >= {"mass", "cg_to_front", "cornering_stiffness_rear"}
+    assert all(value["guess"] for value in proposal["vehicle"].values())
+    notes = " ".join(result.stderr.split())
+    assert "can run: bicycle_on_paper:measured_speed" in notes
+    assert f"{METHOD}" in notes
+    assert "needs channels.wheel_speed_front_left" in notes
+    (here / "proposed.toml").write_text(result.stdout)
+    text = _call("study", "map.csv", "--map", "proposed.toml", "--budget", 2, "--workers", 1)
+    assert "these are guesses, no data of this car: mass" in " ".join(text.split())
+    assert "first half of the log was taken for training" in " ".join(text.split())

@@ -12,27 +12,27 @@ from typer.testing import CliRunner
 import gripbench
 from gripbench.bench.catalogue.registry import choose_method
 from gripbench.bench.command_line import application
+from gripbench.bench.ranking.log_windows import scored_windows
 from gripbench.bench.ranking.ranking import boards
 from gripbench.bench.running.api import plan_of
-from gripbench.bench.running.recorded import score_recordings
 from gripbench.bench.running.recorded_scenarios import (
     judged,
     on_recording,
     recorded_scenario,
     recording_of,
-    windows_of,
 )
+from gripbench.bench.running.recorded_windows import windows_of
 from gripbench.bench.running.runner import run_plan
 from gripbench.bench.running.store import Store
 from gripbench.bench.scoring.metric import pooled_rms
 from gripbench.envs.recordings import Bounds, Recording
 from gripbench.envs.signals import record_type
 from gripbench.errors import InputError
-from gripbench.logs.channel_map import ChannelMap
-from gripbench.logs.excitation import utilisation_bound
 from gripbench.logs.importing import import_frame
+from gripbench.logs.mapping.channel_map import ChannelMap
 from gripbench.logs.published import AbsentDataError, load_recording
 from gripbench.logs.storing import load, store
+from gripbench.logs.vehicle.excitation import utilisation_bound
 
 METHOD = "kinematic_kalman_filter"
 MAP = {
@@ -82,7 +82,7 @@ def scenario(folder):
 
 
 def test_windows_fill_the_test_time_and_end_where_knowledge_of_the_friction_does(folder):
-    windows = windows_of(load(folder).recordings)
+    windows = windows_of(load(folder))
     assert windows[0].start == 15.0
     assert windows[-1].end == pytest.approx(39.98)
     for before, after in pairwise(windows):
@@ -94,13 +94,65 @@ def test_windows_fill_the_test_time_and_end_where_knowledge_of_the_friction_does
 
 def test_a_long_log_has_a_bounded_number_of_windows():
     time = np.arange(0.0, 3600.0, 0.5)
-    records = np.zeros(len(time), record_type(["time"]))
-    records["time"] = time
-    assert len(windows_of((Recording("long", 0, {}, records, records),))) == 20
+    frame = pd.DataFrame({"t": time, "r": 0.0, "beta": 0.0})
+    channel_map = {
+        "name": "long", "time": MAP["time"],
+        "channels": {"yaw_rate": MAP["channels"]["yaw_rate"]},
+        "reference": {"sideslip": MAP["reference"]["sideslip"]},
+    }  # fmt: skip
+    assert len(windows_of(import_frame(frame, channel_map))) == 20
+
+
+def test_a_window_with_a_gap_of_the_reference_joins_its_neighbour():
+    frame = _frame()
+    frame.loc[frame["t"].between(28.2, 30.1), "beta"] = np.nan
+    imported = import_frame(frame, ChannelMap(**{**MAP, "bounds": {}}))
+    found = windows_of(imported)
+    whole = windows_of(import_frame(_frame(), ChannelMap(**{**MAP, "bounds": {}})))
+    assert (found[0].start, found[-1].end) == (whole[0].start, whole[-1].end)
+    assert len(whole) - 2 <= len(found) < len(whole)
+    truth = imported.recordings[0].truth
+    for one in found:
+        inside = (truth["time"] >= one.start) & (truth["time"] < one.end)
+        assert np.isfinite(truth["sideslip"][inside]).mean() >= 0.45
+
+
+def test_windows_come_in_the_order_of_time_and_say_where_they_lie(tmp_path):
+    frame = _frame()
+    frame["t"] += 1000.0
+    given = {"train": [[1000.0, 1010.0]], "test": [[1030.0, 1039.0], [1012.0, 1021.0]]}
+    imported = import_frame(frame, ChannelMap(**{**MAP, "bounds": {}, "windows": given}))
+    place = store(imported, tmp_path / "my_drive")
+    rows = gripbench.run(
+        scenarios=[f"recording:{place}"], methods=["zero_sideslip"], results=tmp_path / "r",
+        workers=1,
+    )  # fmt: skip
+    one = rows.drop_duplicates("seed")
+    assert list(one["log_from"]) == [1012.0, 1015.0, 1018.0, 1030.0, 1033.0, 1036.0]
+    assert list(one["log_to"]) == [1015.0, 1018.0, 1021.0, 1033.0, 1036.0, 1039.0]
+    assert set(one["log_run"]) == {0.0}
+    said = "1012.000 to 1021.000 s, 1030.000 to 1039.000 s of the log's own clock, 6 windows"
+    assert scored_windows(rows) == {"recording:my_drive": said}
+    (board,) = boards(rows, "sideslip", "any")
+    assert f"Scored: {said}." in board.notes
+    stored = gripbench.read_rows(tmp_path / "r")
+    assert list(stored["log_from"]) == list(rows["log_from"])
+
+
+@pytest.mark.parametrize(
+    ("windows", "said"),
+    [
+        ({"test": [[10.0, 30.0], [20.0, 39.0]]}, "test: .* overlap"),
+        ({"train": [[0.0, 20.0]], "test": [[15.0, 39.0]]}, "train .* and test .* overlap"),
+    ],
+)
+def test_windows_that_overlap_are_refused(windows, said):
+    with pytest.raises(ValueError, match=said):
+        ChannelMap(**{**MAP, "windows": windows})
 
 
 def test_nothing_after_a_window_is_seen_and_nothing_outside_it_is_scored(scenario):
-    chosen = windows_of(load_of(scenario).recordings)[2]
+    chosen = windows_of(load_of(scenario))[2]
     recording = recording_of(scenario, 2)
     time = recording.observations["time"]
     assert time[0] == 0.0  # a filter starts with the log, as in a vehicle
@@ -112,22 +164,6 @@ def test_nothing_after_a_window_is_seen_and_nothing_outside_it_is_scored(scenari
 
 def load_of(scenario):
     return load(Path(scenario.place))
-
-
-def test_pooled_rows_have_the_error_of_the_whole_test_time(folder, tmp_path):
-    frame = gripbench.run(
-        scenarios=[f"recording:{folder}"], methods=[METHOD], results=tmp_path / "r", workers=1
-    )
-    assert set(frame["scenario"]) == {"recording:my_drive"}
-    assert set(frame["status"]) == {"ok"}
-    spec = choose_method(METHOD, parameters={"gyro_noise": 0.01})
-    rows = score_recordings(load(folder).recordings, [spec])
-    for target in ("sideslip", "yaw"):
-        part = frame[frame["target"] == target]
-        pooled = np.rad2deg(pooled_rms(part["sum_of_squares"], part["count"]))
-        whole = next(r for r in rows if (r.target, r.estimator) == (target, METHOD))
-        assert pooled == pytest.approx(whole.value, rel=2e-2)  # a window's edges count twice
-        assert part["count"].sum() == pytest.approx(whole.samples, abs=len(part))
 
 
 def test_settings_of_the_map_hold_under_the_plain_label_unless_the_user_sets_otherwise(scenario):
@@ -169,14 +205,13 @@ def test_utilisation_is_a_lower_bound_and_makes_the_strata(scenario, folder):
     assert "utilisation" in recording_of(scenario, 0).truth.dtype.names
 
 
-def test_figures_by_excitation_split_the_samples(folder):
-    recordings = load(folder).recordings
-    whole = score_recordings(recordings, [])
-    parts = score_recordings(recordings, [], by_excitation=True)
-    assert {part.excitation for part in parts} <= {"low", "medium", "high", "limit"}
-    for row in whole:
-        same = [p for p in parts if (p.target, p.estimator) == (row.target, row.estimator)]
-        assert sum(part.samples for part in same) == row.samples
+def test_figures_by_utilisation_split_the_samples(folder, tmp_path):
+    rows = gripbench.run(
+        scenarios=[f"recording:{folder}"], methods=["zero_sideslip"], results=tmp_path / "r",
+        workers=1,
+    )  # fmt: skip
+    bands = [f"rms_{name}_count" for name in ("low", "medium", "high", "limit")]
+    assert rows[bands].sum(axis=1).sum() == rows["count"].sum()
 
 
 def test_absent_data_is_a_skipped_row_and_runs_once_it_is_there(tmp_path, monkeypatch):

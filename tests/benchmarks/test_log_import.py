@@ -7,8 +7,8 @@ import pyarrow.parquet
 import pytest
 
 from gripbench.envs.signals import SIGNALS
-from gripbench.logs.channel_map import ChannelMap
 from gripbench.logs.importing import import_log
+from gripbench.logs.mapping.channel_map import ChannelMap
 from gripbench.methods.kinematic_kalman_filter import KinematicKalmanFilter
 
 CHANNELS = [

@@ -8,7 +8,7 @@ import pytest
 from gripbench.envs.recordings import Recording
 from gripbench.envs.signals import record_type
 from gripbench.errors import InputError
-from gripbench.logs.biases import identify_biases
+from gripbench.logs.vehicle.biases import identify_biases
 
 GYRO, ALONG, ACROSS = 0.004, 0.12, -0.07
 

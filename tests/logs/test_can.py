@@ -7,9 +7,9 @@ import pytest
 
 from gripbench.errors import InputError
 from gripbench.logs.importing import import_log
-from gripbench.logs.inspection import inspect_log
-from gripbench.logs.map_tables import LogFile
-from gripbench.logs.readers import read_log
+from gripbench.logs.mapping.inspection import inspect_log
+from gripbench.logs.mapping.map_tables import LogFile
+from gripbench.logs.readers.reading import read_log
 
 can = pytest.importorskip("can", reason="the extra 'logs' is not installed")
 pytest.importorskip("cantools", reason="the extra 'logs' is not installed")

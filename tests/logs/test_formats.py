@@ -14,7 +14,7 @@ from gripbench.envs.worlds import load_scenario, record
 from gripbench.errors import GripbenchError, InputError
 from gripbench.logs.exporting import export_recording
 from gripbench.logs.importing import import_log
-from gripbench.logs.readers import optional, read_log
+from gripbench.logs.readers.reading import optional, read_log
 from gripbench.methods.slip_slope import SlipSlope
 
 FORMATS = ["csv", "parquet", "mat", "mf4"]

@@ -7,7 +7,7 @@ import pytest
 from single_track import MAP, drive
 
 from gripbench.errors import InputError
-from gripbench.logs.geometry import rotation
+from gripbench.logs.channels.geometry import rotation
 from gripbench.logs.importing import import_frame
 
 G = 9.81

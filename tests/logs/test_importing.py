@@ -3,8 +3,8 @@ import pandas as pd
 import pytest
 
 from gripbench.errors import InputError
-from gripbench.logs.channel_map import load_channel_map
 from gripbench.logs.importing import import_frame, import_log
+from gripbench.logs.mapping.channel_map import load_channel_map
 from gripbench.logs.storing import load, store
 
 

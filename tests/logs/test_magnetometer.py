@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gripbench.errors import InputError
-from gripbench.logs.magnetometer import fit_ellipse, hard_iron_at_heading
+from gripbench.logs.vehicle.magnetometer import fit_ellipse, hard_iron_at_heading
 
 
 @settings(max_examples=50, deadline=None)

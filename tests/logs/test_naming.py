@@ -8,8 +8,8 @@ import pytest
 from single_track import drive
 
 from gripbench.logs.importing import import_log
-from gripbench.logs.inspection import inspect_log
-from gripbench.logs.naming import guesses, is_time
+from gripbench.logs.mapping.inspection import inspect_log
+from gripbench.logs.mapping.naming import guesses, is_time
 
 KNOWN = {
     "LatAcc": ("accel_y", 1), "LongAcc": ("accel_x", 1), "VelForward": ("speed_x", 1),

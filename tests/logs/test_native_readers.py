@@ -11,9 +11,9 @@ import pytest
 from scipy.io import savemat
 
 from gripbench.errors import InputError
-from gripbench.logs import reader_process
-from gripbench.logs.map_tables import LogFile
-from gripbench.logs.readers import read_log
+from gripbench.logs.mapping.map_tables import LogFile
+from gripbench.logs.readers import reader_process
+from gripbench.logs.readers.reading import read_log
 
 DBC = (
     'VERSION ""\nNS_ :\nBS_:\nBU_: ECU\nBO_ 256 M: 8 ECU\n'

@@ -8,7 +8,7 @@ import pytest
 from scipy.io import savemat
 
 from gripbench.errors import InputError
-from gripbench.logs.readers import read_log
+from gripbench.logs.readers.reading import read_log
 
 T = np.arange(30) * 0.01
 R = np.sin(T)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from gripbench.errors import InputError
-from gripbench.logs.channel_map import load_channel_map, vehicle_values
-from gripbench.logs.derivation import slope
+from gripbench.logs.channels.derivation import slope
 from gripbench.logs.locations import data_folder
+from gripbench.logs.mapping.channel_map import load_channel_map, vehicle_values
 from gripbench.logs.published import AbsentDataError, load_recording, recording_files
 
 NAMES = sorted(recording_files())

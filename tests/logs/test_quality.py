@@ -6,9 +6,9 @@ import tomllib
 import numpy as np
 import pytest
 
-from gripbench.logs.channel_map import ChannelMap
 from gripbench.logs.importing import import_frame
-from gripbench.logs.inspection import inspect_log
+from gripbench.logs.mapping.channel_map import ChannelMap
+from gripbench.logs.mapping.inspection import inspect_log
 
 
 def _content(folder):

@@ -7,9 +7,9 @@ import pytest
 
 from gripbench.errors import InputError
 from gripbench.logs.importing import import_log
-from gripbench.logs.inspection import inspect_log
-from gripbench.logs.map_tables import LogFile
-from gripbench.logs.readers import read_log
+from gripbench.logs.mapping.inspection import inspect_log
+from gripbench.logs.mapping.map_tables import LogFile
+from gripbench.logs.readers.reading import read_log
 
 ROWS = [(k * 0.01, 0.2 * np.sin(0.3 * k), 3.0 * np.cos(0.2 * k)) for k in range(40)]
 

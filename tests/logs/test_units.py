@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from gripbench.envs.signals import SIGNALS
 from gripbench.errors import InputError
-from gripbench.logs.units import UNITS, conversion, proposed_unit
+from gripbench.logs.mapping.units import UNITS, conversion, proposed_unit
 
 
 def test_every_signal_has_an_accepted_unit():

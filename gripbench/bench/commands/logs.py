@@ -4,18 +4,13 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from math import isnan
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated, Any
 
 import typer
 
 from gripbench.bench.commands import LOGS
-
-if TYPE_CHECKING:
-    from gripbench.bench.publishing.columns import Table
-    from gripbench.bench.running.recorded import RecordedScore
-
+from gripbench.bench.running.store import DEFAULT_RESULTS
 
 RECORDING = "Name of a recording, folder of an imported one, or a map (TOML) beside its log."
 
@@ -51,8 +46,8 @@ def import_(
 ) -> None:
     """Import a log of a real vehicle as a recording, and report its quality."""
     from gripbench.errors import InputError
-    from gripbench.logs.channel_map import load_channel_map
     from gripbench.logs.importing import import_log
+    from gripbench.logs.mapping.channel_map import load_channel_map
     from gripbench.logs.storing import store
 
     if inspect:
@@ -91,47 +86,59 @@ def path(
 def recordings(
     names: Annotated[
         list[str] | None,
-        typer.Argument(
-            help="Published recordings, or folders of imported ones; by default all published."
-        ),
+        typer.Argument(help=f"{RECORDING} By default all published ones."),
     ] = None,
     method: Annotated[
         list[str] | None,
-        typer.Option(help="name[:variant]; by default every built-in method."),
+        typer.Option(help="name[:variant]; by default all built-in ones that the log can run."),
     ] = None,
     data: Annotated[
         Path | None, typer.Option(help="Folder of the files instead of the one that is set.")
     ] = None,
-    by_excitation: Annotated[
-        bool,
-        typer.Option(
-            "--by-excitation", help="One figure for each band of the utilisation of the tyres."
-        ),
+    wide: Annotated[
+        bool, typer.Option("--wide", help="With every metric: also by utilisation of the tyres.")
     ] = False,
     figures: Annotated[
         Path | None, typer.Option(help="Draw a picture of each recording into this folder.")
     ] = None,
+    workers: Annotated[int, typer.Option(min=0, help="Processes; 0: one a core.")] = 0,
+    results: Annotated[Path, typer.Option(help="Folder of the stored rows.")] = DEFAULT_RESULTS,
     format: Annotated[
         str, typer.Option(help="terminal, text, markdown, csv, latex or html.")
     ] = "terminal",
 ) -> None:
-    """Score methods and trivial estimators on recordings of real vehicles."""
-    from gripbench.bench.publishing.figures.recordings import PICTURES, write_pictures
-    from gripbench.bench.publishing.tables import show
-    from gripbench.bench.running.recorded import score_published
-    from gripbench.logs.published import recording_files
+    """Run methods and baselines on recordings and rank them: `run` and `rank` in one command."""
+    import pandas as pd
 
-    scores = score_published(names or recording_files(), method or (), data, by_excitation)
-    scored = [score for score in scores if score.status == "ok"]
-    if scored:
-        show(_table(scored), format)
+    from gripbench.bench.commands.rank import show_boards
+    from gripbench.bench.publishing.figures.recordings import PICTURES, write_pictures
+    from gripbench.bench.publishing.leaderboard import usual_targets
+    from gripbench.bench.publishing.presentation import print_failures
+    from gripbench.bench.ranking.ranking import boards
+    from gripbench.bench.running.api import run
+    from gripbench.bench.running.recorded_scenarios import PREFIX, recorded_scenario
+    from gripbench.logs.locations import use_data_folder
+
+    use_data_folder(data)
+    more: dict[str, Any] = {"methods": method or (), "results": results, "workers": workers}
+    parts = [] if names else [run("recordings", **more)]
+    for scenario in map(recorded_scenario, names or ()):
+        if scenario.absent:
+            print(scenario.absent, file=sys.stderr)
+        else:
+            parts.append(run(scenarios=[scenario], **more))
+    if not parts:
+        return
+    frame = pd.concat(parts, ignore_index=True)
+    found = []
+    for _, part in frame[frame["status"] != "skipped"].groupby("scenario", sort=False):
+        found += boards(part, usual_targets(part) or (), "any")
+    show_boards(found, format, wide)
     if figures is not None:
-        drawn = sorted({score.recording for score in scored} & set(PICTURES))
-        for path in write_pictures(drawn, figures, data):
+        drawn = {name.removeprefix(PREFIX) for board in found for name in board.scenarios}
+        for path in write_pictures(sorted(drawn & set(PICTURES)), figures):
             print(f"drawn: {path}", file=sys.stderr)
-    left_out = {(score.estimator, score.reason): None for score in scores if score.status != "ok"}
-    for estimator, reason in left_out:
-        print(f"no figure: {estimator or 'recording'}: {reason}", file=sys.stderr)
+    print_failures(frame, stderr=True)
 
 
 def tune(
@@ -150,11 +157,13 @@ def tune(
     """Tune a method on the training windows of a recording, over its parameters' ranges."""
     from gripbench.bench.running.tuning import settings_text, tune_recording, write_variant
     from gripbench.envs.signals import signal
+    from gripbench.logs.locations import use_data_folder
     from gripbench.writing import check_writable
 
     if out is not None:
         check_writable(out)
-    tuned = tune_recording(recording, method, target, draws, data)
+    use_data_folder(data)
+    tuned = tune_recording(recording, method, target, draws)
     spans = ", ".join(f"{start:.3f} to {end:.3f} s" for start, end in tuned.windows)
     print(
         f"# {tuned.draws} trials, {target} on the training windows {spans}: RMS "
@@ -188,20 +197,22 @@ def identify(
     from gripbench.bench.running.recorded_logs import imported_of
     from gripbench.envs.signals import signal
     from gripbench.errors import InputError
-    from gripbench.logs.biases import identify_biases
-    from gripbench.logs.identification import (
+    from gripbench.logs.locations import use_data_folder
+    from gripbench.logs.vehicle.biases import identify_biases
+    from gripbench.logs.vehicle.identification import (
         identify_steering,
         identify_tyres,
         with_velocity,
     )
-    from gripbench.logs.identified_vehicles import (
+    from gripbench.logs.vehicle.identified_vehicles import (
         identified_vehicle,
         vehicle_of,
         write_vehicle,
     )
     from gripbench.logs.windows import windows_text
 
-    imported = imported_of(recording, data)
+    use_data_folder(data)
+    imported = imported_of(recording)
     runs = imported.recordings
     with_tyres = with_velocity(runs)
     if out is not None and not with_tyres:
@@ -237,47 +248,11 @@ def identify(
         print(f"written to {out}")
 
 
-def _table(scores: list[RecordedScore]) -> Table:
-    from gripbench.bench.publishing.columns import Column, Table
-
-    rows = [
-        {
-            "recording": score.recording,
-            "target": score.target,
-            "estimator": score.estimator,
-            "kind": score.kind,
-            "excitation": score.excitation,
-            "measure": f"{score.measure} [{score.unit}]",
-            "value": score.value,
-            "interval": "–" if isnan(low) else f"{low:.3g} to {high:.3g}",
-            "outside": score.outside,
-        }
-        for score in scores
-        for low, high in [(score.low or 0.0, score.high or 0.0)]
-    ]
-    return Table(
-        (
-            Column("recording", "Recording"),
-            Column("target", "Target"),
-            Column("estimator", "Estimator"),
-            Column("kind", "Kind"),
-            *([Column("excitation", "Excitation")] if any(s.excitation for s in scores) else []),
-            Column("measure", "Figure"),
-            Column("value", "Value", format=".3g"),
-            Column("interval", "95 % interval"),
-            Column("outside", "Mean distance from what is known", format=".3g"),
-        ),
-        tuple(rows),
-        caption="Methods and trivial estimators on the test windows of real recordings.",
-        group_by="recording",
-    )
-
-
 def _print_inspection(log: Path, database: Sequence[str]) -> None:
     from rich.table import Table
 
     from gripbench.bench.publishing.presentation import console
-    from gripbench.logs.inspection import inspect_log
+    from gripbench.logs.mapping.inspection import inspect_log
 
     inspection = inspect_log(log, database)
     table = Table("column", "unit", "samples", "blank", "lowest", "highest")
@@ -291,6 +266,28 @@ def _print_inspection(log: Path, database: Sequence[str]) -> None:
             column.high,
         )
     console(stderr=True).print(table)
-    for note in inspection.notes:
+    for note in (*inspection.notes, *_what_would_run(log, inspection.proposal)):
         print(f"note: {note}", file=sys.stderr)
     print(inspection.proposal, end="")
+
+
+def _what_would_run(log: Path, proposal: str) -> list[str]:
+    """Return what a log with the proposed map can run, and the keys that more would need."""
+    import tomllib
+
+    from gripbench.bench.running.forms import what_would_run
+    from gripbench.configuration import parse
+    from gripbench.errors import InputError
+    from gripbench.logs.importing import import_log
+    from gripbench.logs.mapping.channel_map import ChannelMap
+
+    try:
+        imported = import_log(log, parse(ChannelMap, tomllib.loads(proposal), "the proposed map"))
+    except InputError as error:
+        return [f"not to be imported before it is completed: {error}"]
+    first = imported.recordings[0]
+    known = [name for name in first.truth.dtype.names or () if name != "time"]
+    targets = [name for name in known if not name.endswith("_new")]
+    if not targets:
+        return ["no column was found for a reference ([reference.sideslip] and others): no scores"]
+    return what_would_run(first, targets)

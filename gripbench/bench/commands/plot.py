@@ -17,7 +17,9 @@ def register(app: typer.Typer) -> None:
 
 
 def plot(
-    scenario: Annotated[str, typer.Argument(help="A scenario's name or TOML file.")],
+    scenario: Annotated[
+        str, typer.Argument(help="A scenario's name or TOML file, or recording:PLACE.")
+    ],
     methods: Annotated[
         str,
         typer.Option(
@@ -32,8 +34,8 @@ def plot(
         ),
     ] = "",
     seed: Annotated[int, typer.Option(min=0, help="Seed of the run.")] = 0,
-    start: Annotated[float | None, typer.Option(help="From this time [s].")] = None,
-    end: Annotated[float | None, typer.Option(help="Up to this time [s].")] = None,
+    start: Annotated[float | None, typer.Option(help=r"From this time \[s].")] = None,
+    end: Annotated[float | None, typer.Option(help=r"Up to this time \[s].")] = None,
     output: Annotated[
         Path | None, typer.Option(help="File name without suffix; by default under RESULTS/plots.")
     ] = None,

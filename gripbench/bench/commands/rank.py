@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from gripbench.bench.commands import RANK
 from gripbench.bench.running.store import DEFAULT_RESULTS
+
+if TYPE_CHECKING:
+    from gripbench.bench.ranking.ranking import Board
 
 
 def register(app: typer.Typer) -> None:
@@ -46,12 +50,7 @@ def rank(
     wins: Annotated[bool, typer.Option("--wins", help="Also who wins against whom.")] = False,
 ) -> None:
     """Rank the methods of stored rows with the confidence that their runs allow."""
-    from textwrap import fill
-
-    from gripbench.bench.publishing.board_tables import board_table, one_table, wins_table
     from gripbench.bench.publishing.leaderboard import usual_targets
-    from gripbench.bench.publishing.tables import show
-    from gripbench.bench.ranking.answers import words
     from gripbench.bench.ranking.ranking import boards
     from gripbench.bench.running.store import read_rows
     from gripbench.errors import InputError
@@ -69,6 +68,19 @@ def rank(
         reference=reference,
         confidence=confidence,
     )
+    show_boards(found, format_, wide, wins)
+
+
+def show_boards(
+    found: Sequence[Board], format_: str, wide: bool = False, wins: bool = False
+) -> None:
+    """Print boards with what each says in words; as CSV all of them in one table."""
+    from textwrap import fill
+
+    from gripbench.bench.publishing.board_tables import board_table, one_table, wins_table
+    from gripbench.bench.publishing.tables import show
+    from gripbench.bench.ranking.answers import words
+
     if format_ == "csv" and not wins:
         show(one_table(found, wide), format_)
         return

@@ -30,6 +30,12 @@ def report(
             help="Your own method, FILE.py:Class, so that it has curves; repeat for more."
         ),
     ] = None,
+    recording: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Folder or map of a recording of yours, so that it has curves; repeat for more."
+        ),
+    ] = None,
     seeds: Annotated[int, typer.Option(min=1, help="Seeds whose time series can be seen.")] = 3,
     band: Annotated[int, typer.Option(min=1, help="Seeds over which error bands are taken.")] = 20,
     workers: Annotated[int, typer.Option(min=0, help="Processes; 0: one a core.")] = 0,
@@ -61,5 +67,6 @@ def report(
             Backend(workers=workers).processes,
             advance,
             tuple(method or ()),
+            tuple(recording or ()),
         )
     typer.echo(f"Written: {path} ({path.stat().st_size / 1e6:.1f} MB)")

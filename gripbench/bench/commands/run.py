@@ -111,6 +111,7 @@ def run(
     )
     from gripbench.bench.publishing.tables import show
     from gripbench.bench.ranking.degradation import degradation, without_faults
+    from gripbench.bench.ranking.log_windows import scored_windows
     from gripbench.bench.ranking.summary import scores_csv, summary
     from gripbench.bench.running.api import limits_of, order_in, plan_of
     from gripbench.bench.running.backends import Backend
@@ -153,6 +154,8 @@ def run(
     frame = frame_of(sorted(rows, key=order_in(plan)))
     shown = frame[frame["target"].isin([*targets, ""])] if targets else frame
     print_summary(summary(without_faults(shown)))
+    for name, text in scored_windows(frame).items():
+        console().print(f"scored of {name}: {text}", soft_wrap=True)
     if faults:
         damage = degradation(shown)
         for table in degradation_tables(damage):

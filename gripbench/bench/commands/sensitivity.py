@@ -60,9 +60,9 @@ def sensitivity(
     target = target or _target_of(specs)
     chosen = load_suite(suite or _suite_of(target)) if suite or not scenario else None
     names = scenario or list(chosen.scenarios if chosen else ())
+    scenarios = [find_scenario(name) for name in names]
     if not specs:
-        suite_specs = load_suite(suite or _suite_of(target)).specs()
-        specs = [spec for spec in suite_specs if target in spec.declaration.estimates]
+        specs = study.usual_methods(scenarios, suite or _suite_of(target), target)
     for spec in specs:
         if target not in spec.declaration.estimates:
             raise InputError(f"{spec.label} does not estimate '{target}'")
@@ -70,7 +70,6 @@ def sensitivity(
         raise InputError(f"no method of the suite estimates '{target}'")
     if export is not None:
         check_writable(export)
-    scenarios = [find_scenario(name) for name in names]
     ranges = study.ranges_of(scenarios, specs, cause or ())
     frame = study.sensitivity(scenarios, specs, target, ranges, seeds_of(seeds), workers)
     out = console()

@@ -39,7 +39,7 @@ def study(
     from gripbench.bench.publishing.tables import show
     from gripbench.bench.ranking.answers import words
     from gripbench.bench.running import study as running
-    from gripbench.logs.channel_map import load_channel_map
+    from gripbench.logs.mapping.channel_map import load_channel_map
     from gripbench.logs.windows import windows_text
 
     folder = out or Path(f"study_{load_channel_map(channel_map).name}")

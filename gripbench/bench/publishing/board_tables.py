@@ -12,6 +12,7 @@ import pandas as pd
 from gripbench.bench.publishing.columns import Column, Table
 from gripbench.bench.publishing.timings import RelativeRuntime
 from gripbench.bench.ranking.answers import Answer
+from gripbench.bench.ranking.plans import plan_of
 from gripbench.bench.ranking.ranking import Board
 from gripbench.bench.ranking.resolution import resolution
 from gripbench.bench.ranking.skill import NO_BETTER
@@ -57,6 +58,7 @@ def _narrow(board: Board) -> tuple[Column, ...]:
         Column("score", "Score", format=".3g", best="lowest", tied="tied"),
         Column("rms", "RMS", unit, format_),
         Column("rmses_short", f"{100.0 * board.confidence:g} %"),
+        *_mean_columns(board, unit, format_),
         *(
             (
                 Column("skill", "Skill", format=".2f"),
@@ -69,6 +71,12 @@ def _narrow(board: Board) -> tuple[Column, ...]:
         *((Column("percent_next", "> next"),) if board.sensors or not board.guess else ()),
     ]
     return tuple(columns)
+
+
+def _mean_columns(board: Board, unit: str, format_: str) -> tuple[Column, ...]:
+    """Return the mean estimate where the error is only the distance from a known interval."""
+    known = board.lines["mean_estimate"].notna().any()
+    return (Column("mean_estimate", "Mean", unit, format_),) if known else ()
 
 
 def _wide(board: Board, relative: bool) -> tuple[Column, ...]:
@@ -197,7 +205,7 @@ def _answer(one: Answer) -> dict[str, Any]:
     low, high = (f"{value:.3g}" for value in (one.low, one.high))
     error = f"{one.error:.3g}" + (f" ({low}–{high})" if low != "nan" else "")
     better = "no guess was run" if not one.guess else f"{100.0 * one.better:.0f} % of drives"
-    method = one.method if one.useful else f"none: {one.guess} is as good as {one.method}"
+    method = one.method if one.useful else f"none is better than {one.guess}; best: {one.method}"
     return {
         "target": one.target,
         "road": ", ".join(_where(one)),
@@ -216,14 +224,18 @@ def _where(one: Answer) -> list[str]:
 
 
 def one_table(boards: Sequence[Board], wide: bool = False) -> Table:
-    """Return boards under each other in one table, each line with its target and sensors."""
+    """Return boards under each other in one table, each line with plan, target and sensors."""
     parts = [board_table(board, wide=wide) for board in boards]
     columns = {column.key: column for part in parts for column in part.columns}
-    first = (Column("target", "Target"), Column("sensors", "Sensors"))
+    first = (Column("plan", "Plan"), Column("target", "Target"), Column("sensors", "Sensors"))
     rows = [
         dict.fromkeys(columns)
         | dict(row)
-        | {"target": board.target, "sensors": ", ".join(board.sensors) or "any"}
+        | {
+            "plan": plan_of(board.scenarios[0]) if board.scenarios else "",
+            "target": board.target,
+            "sensors": ", ".join(board.sensors) or "any",
+        }
         for board, part in zip(boards, parts, strict=True)
         for row in part.rows
     ]

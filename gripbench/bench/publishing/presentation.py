@@ -227,11 +227,11 @@ def print_summary(summary: pd.DataFrame) -> None:
         out.print(OUTSIDE_FOOTNOTE)
 
 
-def print_failures(rows: pd.DataFrame) -> None:
+def print_failures(rows: pd.DataFrame, stderr: bool = False) -> None:
     """Print what is not ok with its reason: failures one by one, then methods that were skipped."""
     bad = failures(rows)
     skipped = bad["status"] == "skipped"
-    out = console()
+    out = console(stderr)
     for _, line in bad[~skipped].iterrows():
         runs = f"{line['runs']} runs" if line["runs"] > 1 else f"seed {line['first_seed']}"
         out.print(

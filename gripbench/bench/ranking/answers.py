@@ -15,6 +15,7 @@ import pandas as pd
 from gripbench.bench.ranking.grids import opening
 from gripbench.bench.ranking.plans import plan_of, road_of, setting_of, standing
 from gripbench.bench.ranking.ranking import Board, boards
+from gripbench.bench.running.recorded_scenarios import PREFIX
 from gripbench.envs.signals import IDEALISED, signal
 from gripbench.errors import InputError
 
@@ -79,22 +80,23 @@ def best_line(board: Board) -> Any | None:
 
 
 def words(board: Board) -> str:
-    """Return in words what a board says."""
-    shown = signal(board.target)
+    """Return in words what a board says: what to take, how good it is, what may be as good."""
     line = best_line(board)
     if line is None:
         return "No method that a vehicle could run finished every drive."
     with_ = "With any sensors" if line["sensors"] == "any" else f"With {line['sensors']}"
-    unit = "" if shown.display_unit == "-" else f" {shown.display_unit}"
-    factor = shown.display_factor
-    error = f"{factor * line['rms']:.3g}{unit} RMS"
-    if pd.notna(line["rms_from"]):
-        ends = (factor * line["rms_from"], factor * line["rms_to"])
-        error += f" ({100 * board.confidence:g} %: {ends[0]:.3g} to {ends[1]:.3g})"
-    drives = int(line["cells"])
-    parts = [f"{with_} take {line['label']}: {error} over {drives} drives"]
+    what = "windows of one drive" if recorded(board) else "drives"
+    error = f"{_error(board, line)} over {int(line['cells'])} {what}"
+    useless = board.lines[board.lines["verdict"] != ""]
+    if line["verdict"]:
+        guess = board.lines[board.lines["label"] == board.guess].iloc[0]
+        return (
+            f"{with_} no method is better than the guess {board.guess}: {_error(board, guess)}. "
+            f"The best of them is {line['label']}: {error}."
+        )
     order = list(board.lines["label"])
     place = order.index(line["label"])
+    parts = [f"{with_} take {line['label']}: {error}"]
     if pd.notna(line["beats_next"]) and order[place + 1] != board.guess:
         parts.append(f"better than {order[place + 1]} in {100 * line['beats_next']:.0f} % of them")
     if board.guess:
@@ -102,15 +104,42 @@ def words(board: Board) -> str:
             f"better than the guess {board.guess} in {100 * line['beats_guess']:.0f} % of them"
         )
     text = ", ".join(parts) + "."
-    if line["verdict"]:
-        text += f" It is {line['verdict']}: {board.guess} is as good."
-    elif line["worse_than_guess"]:
+    if line["worse_than_guess"]:
         text += f" Worse than that guess in {line['worse_than_guess']}."
-    useless = board.lines[board.lines["verdict"] != ""]
+    rivals = board.lines[(board.lines["rank_from"] == 1) & board.lines["score"].notna()]
+    alike = [name for name in rivals["label"] if name != line["label"]]
+    if alike and line["rank_from"] == 1:
+        text += f" These {what} do not tell it apart from {_listed(alike)}."
     others = [name for name in useless["label"] if name != line["label"]]
     if others:
         text += f" No better than a guess: {', '.join(others)}."
     return text
+
+
+def recorded(board: Board) -> bool:
+    """Return whether a board is of a recording: its runs are windows of one drive."""
+    return bool(board.scenarios) and board.scenarios[0].startswith(PREFIX)
+
+
+def _error(board: Board, line: Any) -> str:
+    """Return a method's error with its unit and interval."""
+    shown = signal(board.target)
+    unit = "" if shown.display_unit == "-" else f" {shown.display_unit}"
+    error = f"{shown.display_factor * line['rms']:.3g}{unit} RMS"
+    if pd.isna(line["rms_from"]):
+        return error
+    ends = (shown.display_factor * line["rms_from"], shown.display_factor * line["rms_to"])
+    return f"{error} ({100 * board.confidence:g} %: {ends[0]:.3g} to {ends[1]:.3g})"
+
+
+def _listed(names: list[str]) -> str:
+    """Return names with commas and a last `or`; of many the first three and their number."""
+    if len(names) > _MOST_NAMED:
+        return f"{', '.join(names[:3])} or {len(names) - 3} others"
+    return " or ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
+_MOST_NAMED = 4
 
 
 def answers(rows: pd.DataFrame, targets: Iterable[str]) -> list[Answer]:

@@ -29,6 +29,7 @@ from gripbench.bench.ranking.grids import (
     on_board,
     sensor_sets,
 )
+from gripbench.bench.ranking.log_windows import scored_windows
 from gripbench.bench.ranking.method_lines import Settings, method_line
 from gripbench.bench.ranking.pareto import pareto_front
 from gripbench.bench.ranking.plans import plan_of
@@ -257,7 +258,7 @@ def _board(
         runs=matrix,
         p_better=p_better.reindex(index=complete, columns=complete),
         wins=pd.DataFrame(wins, index=order, columns=order),
-        notes=grid.notes,
+        notes=(*(f"Scored: {text}." for text in scored_windows(grid.rows).values()), *grid.notes),
     )
 
 

@@ -15,9 +15,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 
-from gripbench.bench.catalogue.registry import MethodSpec, built_in_methods, choose_method
+from gripbench.bench.catalogue.registry import (
+    MethodSpec,
+    built_in_methods,
+    choose_method,
+)
+from gripbench.bench.catalogue.suites import load_suite
 from gripbench.bench.running.cells import cell_of, close_sandboxes, run_cell
+from gripbench.bench.running.forms import runnable
 from gripbench.bench.running.isolation.limits import Limits
+from gripbench.bench.running.recorded_scenarios import RecordedScenario, on_recording, scored_runs
 from gripbench.envs.populations.causes import CAUSES, PROCESSES, SHAPES_OF_TYRES, SIDES
 from gripbench.envs.populations.population import load_population
 from gripbench.envs.scenarios import Scenario
@@ -63,13 +70,28 @@ class Range:
         return multiple * self.high if multiple >= 0.0 else -multiple * self.low
 
 
-def baselines(target: str) -> tuple[MethodSpec, ...]:
-    """Return the baselines that estimate a target."""
-    return tuple(
-        choose_method(name)
+def baselines(target: str, scenarios: Sequence[Scenario] = ()) -> tuple[MethodSpec, ...]:
+    """Return the baselines that estimate a target, on recordings in the form that can run."""
+    found = {
+        name: choose_method(name)
         for name, method in built_in_methods().items()
         if getattr(method, "baseline", False) and target in method.estimates
-    )
+    }
+    for item in scenarios:
+        if isinstance(item, RecordedScenario):
+            fitting = runnable(scored_runs(item)[0], (target,))[0]
+            found |= {name: spec for name, spec in fitting.items() if spec.declaration.baseline}
+    return tuple(found.values())
+
+
+def usual_methods(scenarios: Sequence[Scenario], suite: str, target: str) -> list[MethodSpec]:
+    """Return the methods that estimate a target: of a suite, or those that recordings can run."""
+    recorded = [item for item in scenarios if isinstance(item, RecordedScenario)]
+    if recorded and len(recorded) == len(scenarios):
+        fitting = runnable(scored_runs(recorded[0])[0], (target,))[0].values()
+        return [spec for spec in fitting if not spec.declaration.baseline]
+    specs = load_suite(suite).specs()
+    return [spec for spec in specs if target in spec.declaration.estimates]
 
 
 def ranges_of(
@@ -91,15 +113,16 @@ def ranges_of(
     """
     found: dict[str, Range] = {}
     names = {name for method in methods for name in method.declaration.vehicle_parameters}
-    given = {name for item in scenarios for name in load_vehicle(item.vehicle).parameters}
+    given = {name for item in scenarios for name in _on_paper(item)}
     for name in VEHICLE_PARAMETERS:
         if name in names & given:
             size = _PAPER_RANGE.get(name, _OTHER_PAPER_RANGE)
             found[PAPER + name] = Range(PAPER + name, "relative", -size, size)
-    for population in dict.fromkeys(item.population for item in scenarios):
+    driven = [item for item in scenarios if not isinstance(item, RecordedScenario)]
+    for population in dict.fromkeys(item.population for item in driven):
         if not population:
             raise InputError(
-                f"{scenarios[0].name}: key 'population' is missing, so no cause has a range"
+                f"{driven[0].name}: key 'population' is missing, so no cause has a range"
             )
         for name, spread in load_population(population).spreads.items():
             if name in found or name in (SHAPES_OF_TYRES, SIDES):
@@ -113,8 +136,20 @@ def ranges_of(
                 found[name] = Range(name, unit, low + spread.centre, high + spread.centre)
     for name in chosen:
         if name not in found:
+            if not driven and name in CAUSES:
+                raise InputError(
+                    f"cause '{name}': the car, road and sensors of a recording are what they were; "
+                    f"only what methods are told of the car can differ: {', '.join(found)}"
+                )
             raise unknown("cause", name, found)
     return [item for name, item in found.items() if not chosen or name in chosen]
+
+
+def _on_paper(scenario: Scenario) -> Iterable[str]:
+    """Return the vehicle parameters that methods are told of."""
+    if isinstance(scenario, RecordedScenario):
+        return scored_runs(scenario)[0].vehicle
+    return load_vehicle(scenario.vehicle).parameters
 
 
 def sensitivity(
@@ -130,7 +165,7 @@ def sensitivity(
     Parameters
     ----------
     scenarios
-        What is driven; their levels are set to 0.
+        What is driven; their levels are set to 0. Of a recording it is the whole test time.
     methods
         What is tried; the baselines of the target come on top.
     target
@@ -138,7 +173,7 @@ def sensitivity(
     ranges
         Causes.
     seeds
-        Seeds of the runs.
+        Seeds of the simulated runs.
     workers
         Processes; 0: one a core.
 
@@ -150,11 +185,10 @@ def sensitivity(
     """
     import joblib
 
-    plain = [at_level(item, 0) for item in scenarios]
     labels = {spec.label for spec in methods}
-    trivial = baselines(target)
+    trivial = baselines(target, scenarios)
     specs = [*methods, *(spec for spec in trivial if spec.label not in labels)]
-    runs = [(item, seed) for item in plain for seed in seeds]
+    runs = [run for item in scenarios for run in _runs(item, seeds)]
     sums: _Sums = {}
     with joblib.Parallel(n_jobs=workers or -1) as parallel:
 
@@ -187,6 +221,14 @@ def sensitivity(
                 }
                 lines.append(common | {"rms": _rms(sums, spec.label, given, size)})
     return pd.DataFrame(lines)
+
+
+def _runs(scenario: Scenario, seeds: Iterable[int]) -> list[tuple[Scenario, int]]:
+    """Return the runs of a scenario without spread; of a recording those of the log."""
+    if isinstance(scenario, RecordedScenario):
+        return [(scenario, run) for run in range(len(scored_runs(scenario)))]
+    plain = at_level(scenario, 0)
+    return [(plain, seed) for seed in seeds]
 
 
 _Sums = dict[tuple[str, str, float], tuple[float, int, int]]
@@ -232,7 +274,12 @@ def _measure(
     """Return sum of squares and count by label, cause and multiple, in runs of one seed."""
     found = {}
     on_paper = given.cause.startswith(PAPER)
-    plain = record(scenario, seed) if on_paper or not given.cause else None
+    plain = None
+    if isinstance(scenario, RecordedScenario):
+        plain = scored_runs(scenario)[seed]
+        specs = [on_recording(spec, scenario) for spec in specs]
+    elif on_paper or not given.cause:
+        plain = record(scenario, seed)
     for size in sizes:
         recording = plain
         if on_paper and plain is not None:

@@ -12,13 +12,12 @@ from gripbench.bench.catalogue.registry import MethodSpec, built_in_methods, cho
 from gripbench.bench.catalogue.scenarios import find_scenario
 from gripbench.bench.catalogue.suites import load_suite
 from gripbench.bench.running.backends import Backend
-from gripbench.bench.running.execution import missing
+from gripbench.bench.running.forms import runnable
 from gripbench.bench.running.isolation.limits import Limits
 from gripbench.bench.running.recorded_scenarios import recording_of
 from gripbench.bench.running.rows import Row, frame_of
 from gripbench.bench.running.runner import Plan, run_plan
 from gripbench.bench.running.store import DEFAULT_RESULTS, Store
-from gripbench.bench.scoring.scoring import targets_of
 from gripbench.envs.scenarios import LEVELS, Scenario
 from gripbench.envs.worlds import at_level
 from gripbench.errors import InputError
@@ -152,20 +151,17 @@ def plan_of(
 
 
 def fitting(scenarios: Sequence[Scenario]) -> list[MethodSpec]:
-    """Return the built-in methods that some scenario gives all channels, parameters and a truth."""
-    runs = [
-        recording_of(scenario, 0) for scenario in scenarios if not getattr(scenario, "absent", "")
-    ]
-    specs = [choose_method(name) for name in built_in_methods()]
-    return [
-        spec
-        for spec in specs
-        if any(
-            not missing(spec.declaration, run.vehicle, run.observations.dtype.names or ())
-            and targets_of(spec.declaration.estimates, run)
-            for run in runs
-        )
-    ]
+    """Return the built-in methods that some scenario gives all channels, parameters and a truth.
+
+    Each in its first form that can run, see `running.forms.runnable`.
+    """
+    found: dict[str, MethodSpec] = {}
+    for scenario in scenarios:
+        if not getattr(scenario, "absent", ""):
+            run = recording_of(scenario, 0)
+            found |= runnable(run, run.truth.dtype.names or ())[0]
+    order = list(built_in_methods())
+    return sorted(found.values(), key=lambda spec: order.index(spec.declaration.name))
 
 
 def seeds_of(given: int | str | range | None) -> range:

@@ -28,6 +28,7 @@ from gripbench.bench.running.recorded_scenarios import (
     RecordedScenario,
     judged,
     log_run_of,
+    log_window,
     recording_of,
 )
 from gripbench.bench.running.rows import Row, Status
@@ -154,7 +155,8 @@ def _run_windows(task: Task, scenario: RecordedScenario) -> list[Row]:
         passed = _passed(final, task.limits, task.timed) if len(cells) > 1 else None
         for cell in cells:
             recording = recording_of(scenario, cell.seed)
-            rows.append(run_cell(cell, recording, task.limits, task.timed, passed))
+            row = run_cell(cell, recording, task.limits, task.timed, passed)
+            rows.append(row.model_copy(update={"window": log_window(recording)}))
     return rows
 
 

@@ -67,13 +67,22 @@ def missing(
     declaration: Declaration, vehicle: Mapping[str, float], channels: tuple[str, ...]
 ) -> str:
     """Return why a method cannot run where only these channels are given; empty: it can."""
-    lacking = [name for name in declaration.sensors if not is_given(name, channels)]
-    if lacking:
-        return "the scenario has no sensor for " + ", ".join(f"'{name}'" for name in lacking)
-    lacking = [name for name in declaration.vehicle_parameters if name not in vehicle]
-    if lacking:
-        return "the vehicle does not give " + ", ".join(f"'{name}'" for name in lacking)
+    sensors, parameters = lacking(declaration, vehicle, channels)
+    if sensors:
+        return "the scenario has no sensor for " + ", ".join(f"'{name}'" for name in sensors)
+    if parameters:
+        return "the vehicle does not give " + ", ".join(f"'{name}'" for name in parameters)
     return ""
+
+
+def lacking(
+    declaration: Declaration, vehicle: Mapping[str, float], channels: tuple[str, ...]
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the channels and the vehicle parameters that a method needs and is not given."""
+    return (
+        tuple(name for name in declaration.sensors if not is_given(name, channels)),
+        tuple(name for name in declaration.vehicle_parameters if name not in vehicle),
+    )
 
 
 def execute(

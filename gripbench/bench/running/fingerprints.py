@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import gripbench
-from gripbench.bench.running import recorded_scenarios
+from gripbench.bench.running import recorded_scenarios, recorded_windows
 from gripbench.bench.scoring.metrics import metrics
 from gripbench.envs import worlds
 from gripbench.envs.instruments.fault_injection import Faults
@@ -53,8 +53,8 @@ COMPILER_SWITCHES = (
 def scenario_digest(scenario: Scenario) -> str:
     """Return the digest of all that a recording depends on besides the seed."""
     if isinstance(scenario, recorded_scenarios.RecordedScenario):
-        windows = inspect.getsource(recorded_scenarios)
-        return digest(scenario.content, scenario.absent, windows, source_digest(_RECORDED))
+        windows = inspect.getsource(recorded_scenarios) + inspect.getsource(recorded_windows)
+        return digest(scenario.content, scenario.absent, windows, source_digest(*_RECORDED))
     world = worlds.known_worlds()[scenario.world]
     classes: tuple[Any, ...] = (world.scenario, world.simulation)
     files = [Path(inspect.getfile(item)) for item in classes]
@@ -74,7 +74,7 @@ def scenario_digest(scenario: Scenario) -> str:
     return digest(json.dumps(content, sort_keys=True), sources, inspect.getsource(worlds.record))
 
 
-_RECORDED = _PROJECT / "logs" / "excitation.py"
+_RECORDED = tuple(_PROJECT / "logs" / name for name in ("coverage.py", "vehicle/excitation.py"))
 _RECORDING = ("instruments/suite.py", "recordings.py", "vehicles.py", "plants/simulation.py")
 
 

@@ -18,26 +18,15 @@ STORED = Path("recordings")
 """Where `gripbench import` keeps recordings unless told otherwise."""
 
 
-def imported_of(place: str, folder: Path | None = None) -> ImportedLog:
+def imported_of(name: str) -> ImportedLog:
     """Return a recording by name, folder or map with what was found about it.
-
-    Parameters
-    ----------
-    place
-        As `recorded_scenario` takes it.
-    folder
-        Where the files of published recordings lie, see `gripbench.logs.locations`.
 
     Raises
     ------
     InputError
         If there is no such recording, or its files are not at hand.
     """
-    from gripbench.logs.published import load_recording, recording_files
-
-    if folder is not None and place in recording_files():
-        return load_recording(place, folder)
-    return load_place(place_of(place.removeprefix(PREFIX)))
+    return load_place(place_of(name.removeprefix(PREFIX)))
 
 
 def place_of(name: str) -> str:
@@ -67,7 +56,7 @@ def load_place(place: str) -> ImportedLog:
         return _published(place, data_folder())
     path = Path(place)
     if place.endswith(".toml"):
-        from gripbench.logs.beside import log_beside
+        from gripbench.logs.mapping.beside import log_beside
 
         log = log_beside(path)
         files = [path, *(sorted(log.iterdir()) if log.is_dir() else [log])]

@@ -13,9 +13,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass, replace
-from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Literal, Self
+from dataclasses import asdict, replace
+from itertools import groupby
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +24,8 @@ from pydantic import Field, model_validator
 from gripbench.bench.catalogue.declarations import declaration_of
 from gripbench.bench.running.recorded_logs import PREFIX as PREFIX
 from gripbench.bench.running.recorded_logs import load_place, place_of
+from gripbench.bench.running.recorded_windows import Window, windows_of
+from gripbench.bench.running.rows import LogWindow
 from gripbench.envs.instruments.sensors import Sensor
 from gripbench.envs.recordings import Recording
 from gripbench.envs.scenarios import Scenario
@@ -35,14 +37,8 @@ if TYPE_CHECKING:
     from gripbench.bench.catalogue.registry import MethodSpec
     from gripbench.logs.importing import ImportedLog
 
-SHORTEST = 3.0
-"""Length [s] of a window, longer where there would be more than `MOST`."""
-
-MOST = 20
-"""Windows that a recording has at most, about."""
-
 _ANGLES = ("yaw", "sideslip", "course")
-_Interval = tuple[float, float]
+_RUN = "log_run"  # in the notes of a window's recording: which of the log's runs it is of
 
 
 class RecordedScenario(Scenario):
@@ -83,26 +79,6 @@ class RecordedScenario(Scenario):
         return {}
 
 
-@dataclass(frozen=True)
-class Window:
-    """One run of a recorded scenario: an interval [s] of one of the log's recordings.
-
-    Attributes
-    ----------
-    recording
-        Which of the log's recordings.
-    start, end
-        The interval on the clock of its rows, which starts at 0.
-    last
-        Whether its end belongs to it; where another window follows, the sample is that one's.
-    """
-
-    recording: int
-    start: float
-    end: float
-    last: bool = True
-
-
 def recorded_scenario(place: str) -> RecordedScenario:
     """Return a recording as a scenario.
 
@@ -127,13 +103,14 @@ def recorded_scenario(place: str) -> RecordedScenario:
             name=PREFIX + place, description="", vehicle="", horizon=1.0, sample_time=1.0,
             place=place, runs=1, absent=str(error), content="absent",
         )  # fmt: skip
-    windows = windows_of(imported.recordings)
+    windows = windows_of(imported)
     said = imported.provenance
+    vehicle = said.channel_map.get("vehicle", "")
     times = [recording.observations["time"] for recording in imported.recordings]
     return RecordedScenario(
         name=PREFIX + said.name,
         description=said.description,
-        vehicle=str(said.channel_map.get("vehicle", "")),
+        vehicle=vehicle if isinstance(vehicle, str) else "",
         horizon=float(max(time[-1] for time in times)),
         sample_time=float(np.median(np.concatenate([np.diff(time) for time in times]))),
         place=place,
@@ -169,18 +146,48 @@ def recording_of(scenario: Scenario, seed: int) -> Recording:
     if scenario.absent:
         raise InputError(scenario.absent)
     imported = load_place(scenario.place)
-    recordings = imported.recordings
-    windows = windows_of(recordings)
+    windows = windows_of(imported)
     if seed >= len(windows):
         raise InputError(f"{scenario.name}: has {len(windows)} windows, so no seed {seed}")
     chosen = windows[seed]
     given = imported.provenance.channel_map.get("derived", {}).get("instruments", ())
-    return _part(recordings[chosen.recording], chosen, scenario.name, seed, tuple(given))
+    return _part(
+        imported.recordings[chosen.recording], (chosen,), scenario.name, seed, tuple(given)
+    )
+
+
+def scored_runs(scenario: RecordedScenario) -> tuple[Recording, ...]:
+    """Return the runs of a log, each to the end of its last window and with truth in all of them.
+
+    Raises
+    ------
+    InputError
+        If it is not at hand.
+    """
+    if scenario.absent:
+        raise InputError(scenario.absent)
+    imported = load_place(scenario.place)
+    windows = windows_of(imported)
+    given = imported.provenance.channel_map.get("derived", {}).get("instruments", ())
+    return tuple(
+        _part(imported.recordings[index], tuple(parts), scenario.name, run, tuple(given))
+        for run, (index, parts) in enumerate(groupby(windows, lambda window: window.recording))
+    )
+
+
+def log_window(recording: Recording) -> LogWindow | None:
+    """Return what part of its log a recording is scored on; None of a simulated one."""
+    if _RUN not in recording.notes:
+        return None
+    ((start, end),) = recording.windows["test"]
+    origin = recording.notes.get("time_origin", 0.0)
+    run = int(recording.notes[_RUN])
+    return LogWindow(run=run, start=round(origin + start, 6), end=round(origin + end, 6))
 
 
 def log_run_of(scenario: RecordedScenario, seed: int) -> int:
     """Return which of a log's runs a window belongs to: one pass serves all windows of it."""
-    return windows_of(load_place(scenario.place).recordings)[seed].recording
+    return windows_of(load_place(scenario.place))[seed].recording
 
 
 def on_recording(spec: MethodSpec, scenario: Scenario) -> MethodSpec:
@@ -243,63 +250,25 @@ def judged(recording: Recording, estimates: npt.NDArray[Any]) -> Recording:
     return replace(recording, truth=truth)
 
 
-def windows_of(recordings: tuple[Recording, ...]) -> tuple[Window, ...]:
-    """Return the windows of a log: its test time, cut where an interval begins or ends to be known.
-
-    Raises
-    ------
-    InputError
-        If nothing is to be scored.
-    """
-    pieces = [
-        (index, start, end)
-        for index, recording in enumerate(recordings)
-        for start, end in _pieces(recording)
-    ]
-    if not pieces:
-        raise InputError(f"{recordings[0].scenario}: no sample lies in a window 'test'")
-    length = max(SHORTEST, sum(end - start for _, start, end in pieces) / MOST)
-    windows = []
-    for index, start, end in pieces:
-        edges = np.linspace(start, end, max(1, round((end - start) / length)) + 1)
-        for low, high in pairwise(edges):
-            windows.append(Window(index, float(low), float(high)))
-    windows = [
-        replace(one, last=(one.recording, one.end) != (after.recording, after.start))
-        for one, after in pairwise([*windows, Window(-1, 0.0, 0.0)])
-    ]
-    return tuple(windows)
-
-
-def _pieces(recording: Recording) -> list[_Interval]:
-    time = recording.truth["time"]
-    last = float(time[-1])
-    given = recording.windows.get("test", ()) if recording.windows else ((0.0, last),)
-    cuts = {cut for bound in recording.bounds for cut in (bound.start, bound.end)}
-    found = []
-    for start, end in given:
-        first, final = max(start, recording.score_from), min(end, last)
-        edges = [first, *sorted(cut for cut in cuts if first < cut < final), final]
-        found += [
-            (low, high) for low, high in pairwise(edges) if ((time >= low) & (time <= high)).any()
-        ]
-    return found
-
-
 def _part(
-    recording: Recording, window: Window, name: str, seed: int, given: tuple[str, ...]
+    recording: Recording, windows: tuple[Window, ...], name: str, seed: int, given: tuple[str, ...]
 ) -> Recording:
-    from gripbench.logs.excitation import utilisation_bound
+    """Return a run of a log to the end of its last window, with the truth of its windows only."""
+    from gripbench.logs.vehicle.excitation import utilisation_bound
 
     time = recording.truth["time"]
-    side: Literal["left", "right"] = "right" if window.last else "left"
-    kept = slice(0, int(np.searchsorted(time, window.end, side=side)))
-    inside = time[kept] >= window.start
+    inside = np.zeros(len(time), dtype=bool)
+    for window in windows:
+        before = time <= window.end if window.last else time < window.end
+        inside |= (time >= window.start) & before
+    kept = slice(0, int(np.flatnonzero(inside)[-1]) + 1)
+    inside = inside[kept]
+    start, end = windows[0].start, windows[-1].end
     truth = recording.truth[kept]
     bounds = tuple(
         bound
         for bound in recording.bounds
-        if bound.start < window.end and bound.end > window.start
+        if bound.start < end and bound.end > start
         and bound.signal not in (truth.dtype.names or ())
     )  # fmt: skip
     columns = {
@@ -325,8 +294,9 @@ def _part(
         seed=seed,
         observations=recording.observations[kept],
         truth=shown,
-        score_from=window.start,
-        windows={"test": ((window.start, window.end),)},
+        score_from=start,
+        windows={"test": tuple((window.start, window.end) for window in windows)},
+        notes=recording.notes | {_RUN: float(recording.seed)},
         bounds=bounds,
     )
 

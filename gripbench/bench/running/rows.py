@@ -21,7 +21,7 @@ from gripbench.errors import LONGEST, InputError, one_line
 if TYPE_CHECKING:
     import pandas as pd
 
-SCHEMA_VERSION = 5
+SCHEMA_VERSION = 6
 """Version of the stored form; rows of every earlier version still load (see `_MIGRATIONS`)."""
 
 Text = Annotated[str, BeforeValidator(lambda text: _storable(text))]
@@ -61,6 +61,22 @@ class Runtime(Configuration):
     deadline_misses: float | None = None
 
 
+class LogWindow(Configuration):
+    """The part of a log that a row is scored on.
+
+    Attributes
+    ----------
+    run
+        Which of the log's runs.
+    start, end
+        The interval [s] on the log's own clock, as in the quality report.
+    """
+
+    run: int = 0
+    start: float
+    end: float
+
+
 class Row(Configuration):
     """One cell of the benchmark.
 
@@ -98,6 +114,8 @@ class Row(Configuration):
         What it did whose result no digest can follow: the row is never used again.
     computed_outside
         Whether the estimates were handed in: neither causality nor runtime was checked.
+    window
+        Of a recording, what part of the log was scored.
     method_digest
         Digest of source and settings of a plug-in; empty for a method that ships with gripbench.
     checked
@@ -133,6 +151,7 @@ class Row(Configuration):
     dependencies: dict[str, str] = Field(default_factory=dict)
     untracked: tuple[str, ...] = ()
     computed_outside: bool = False
+    window: LogWindow | None = None
     method_digest: str = ""
     checked: Checked = Field(default="", exclude=True)
     versions: dict[str, str] = Field(default_factory=dict)
@@ -194,6 +213,7 @@ _MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {
     2: lambda content: {**content, "schema_version": 3},  # 3 added what a row rests on
     3: _to_metrics,
     4: lambda content: {**content, "schema_version": 5},  # 5 added where it was computed
+    5: lambda content: {**content, "schema_version": 6},  # 6 added the window of a log
 }
 """For each earlier version, the function that turns its content into the next version's."""
 
@@ -242,7 +262,8 @@ def frame_of(rows: Iterable[Row]) -> pd.DataFrame:
     vanishes from a table made of the frame. Columns: `scenario, seed, label, method, variant,
     title, target, status, reason`, the columns of each metric, `sample_period, step_batch,
     step_p50, step_p99, step_max, deadline_misses, sensors, idealised, parameters, baseline,
-    world, key, checked, computed_outside`.
+    world, key, checked, computed_outside, log_run, log_from, log_to`; the last three say which run
+    and what interval [s] on a log's own clock was scored, NaN for a simulated run.
 
     A metric has a column of its name; one that is pooled by totals also `<name>_total` and
     `<name>_count`, which for the RMS are called `sum_of_squares` and `count`. NaN: the metric has
@@ -268,16 +289,19 @@ def frame_of(rows: Iterable[Row]) -> pd.DataFrame:
     return pd.DataFrame(lines, columns=columns).astype(numbers)
 
 
+LOG_WINDOW = ("log_run", "log_from", "log_to")
+"""Columns of the part of a log that a row is scored on."""
+
 _COMMON = (
     "scenario", "seed", "label", "method", "variant", "title", "status", "reason",
     "sample_period", "step_batch", "step_p50", "step_p99", "step_max", "deadline_misses",
     "sensors", "idealised", "parameters", "baseline", "world", "key", "checked",
-    "computed_outside",
+    "computed_outside", *LOG_WINDOW,
 )  # fmt: skip
 
 
 def _common_columns(row: Row) -> dict[str, Any]:
-    runtime = row.runtime
+    runtime, window = row.runtime, row.window
     return {
         "scenario": row.scenario,
         "seed": row.seed,
@@ -301,6 +325,9 @@ def _common_columns(row: Row) -> dict[str, Any]:
         "key": row.key,
         "checked": row.checked,
         "computed_outside": row.computed_outside,
+        "log_run": float(window.run) if window else math.nan,
+        "log_from": window.start if window else math.nan,
+        "log_to": window.end if window else math.nan,
     }
 
 

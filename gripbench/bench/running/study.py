@@ -6,13 +6,13 @@ the map names no window, the first half of each run is for training and the seco
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from gripbench.bench.catalogue.registry import MethodSpec, built_in_methods, choose_method
+from gripbench.bench.catalogue.registry import choose_method
 from gripbench.bench.running.backends import Backend
-from gripbench.bench.running.execution import missing
+from gripbench.bench.running.forms import runnable
 from gripbench.bench.running.recorded_logs import PREFIX
 from gripbench.bench.running.recorded_scenarios import recorded_scenario
 from gripbench.bench.running.rows import Row
@@ -22,9 +22,9 @@ from gripbench.bench.running.tuning import BUDGET, Tuned, searched, tune, write_
 from gripbench.envs.recordings import Recording
 from gripbench.envs.vehicles import CarOnPaper
 from gripbench.errors import InputError
-from gripbench.logs.identification import LOOSE, Identified, identify_tyres, with_velocity
 from gripbench.logs.importing import ImportedLog, import_log
 from gripbench.logs.storing import store
+from gripbench.logs.vehicle.identification import LOOSE, Identified, identify_tyres, with_velocity
 
 _ON_PAPER = {
     "stiffness_front": "cornering_stiffness_front",
@@ -117,18 +117,22 @@ def study(
         )
     say("identifying the vehicle on the training windows")
     found, imported = _identified(imported, words)
+    words += _guesses(imported)
     kept = store(imported, folder / "recording")
     runs = imported.recordings
-    choices, left_out = runnable(runs[0], target)
-    tuned = []
-    for choice, spec in choices.items():
-        if spec.declaration.baseline or not searched(choice):
-            continue
-        say(f"tuning {choice}")
-        try:
-            tuned.append(tune(choice, runs, target, draws=budget))
-        except InputError as error:
-            words.append(f"{choice} was not tuned: {error}.")
+    choices, left_out = runnable(runs[0], (target,))
+    to_tune = [
+        choice
+        for choice, spec in choices.items()
+        if not spec.declaration.baseline and searched(choice)
+    ]
+    tuned: list[Tuned] = []
+    for choice, found_or_why in _each_tuned(to_tune, runs, target, budget, workers):
+        say(f"tuned {choice}")
+        if isinstance(found_or_why, Tuned):
+            tuned.append(found_or_why)
+        else:
+            words.append(f"{choice} was not tuned: {found_or_why}.")
     specs = list(choices.values())
     for one in tuned:
         path = folder / "variants" / f"{one.method.replace(':', '-')}.toml"
@@ -148,30 +152,24 @@ def study(
     return Study(imported, found, tuple(tuned), tuple(rows), left_out, tuple(words), folder, target)
 
 
-def runnable(recording: Recording, target: str) -> tuple[dict[str, MethodSpec], dict[str, str]]:
-    """Return the methods that a recording can run, and what the others lack, by choice.
+def _each_tuned(
+    choices: Sequence[str], runs: Sequence[Recording], target: str, budget: int, workers: int
+) -> Iterator[tuple[str, Tuned | str]]:
+    """Yield each method with its tuning, or why there is none; several at once."""
+    import joblib
 
-    Of each method it is the first form, the method itself or a variant with other sensors, whose
-    channels and vehicle parameters are there.
-    """
-    channels = recording.observations.dtype.names or ()
-    found: dict[str, MethodSpec] = {}
-    lacking: dict[str, str] = {}
-    for name, method in built_in_methods().items():
-        if target not in method.estimates:
-            continue
-        others = [key for key, one in method.variants.items() if one.sensors is not None]
-        reasons = []
-        for choice in (name, *(f"{name}:{key}" for key in others)):
-            spec = choose_method(choice)
-            reason = missing(spec.declaration, recording.vehicle, channels)
-            if not reason:
-                found[choice] = spec
-                break
-            reasons.append(f"{choice}: {reason}" if choice != name else reason)
-        else:
-            lacking[name] = "; or ".join(reasons)
-    return found, lacking
+    call = joblib.delayed(_tuned_or_why)
+    made = joblib.Parallel(n_jobs=workers or -1, return_as="generator")(
+        call(choice, runs, target, budget) for choice in choices
+    )
+    yield from zip(choices, made, strict=True)
+
+
+def _tuned_or_why(choice: str, runs: Sequence[Recording], target: str, budget: int) -> Tuned | str:
+    try:
+        return tune(choice, runs, target, draws=budget)
+    except InputError as error:
+        return str(error)
 
 
 def _halved(recording: Recording) -> Recording:
@@ -207,7 +205,42 @@ def _identified(imported: ImportedLog, words: list[str]) -> tuple[Identified | N
         elif value is not None:
             words.append(f"{parameter} stays as on paper, for the log does not settle it.")
     car = CarOnPaper(vehicle)
-    return found, replace(imported, recordings=tuple(replace(r, vehicle=car) for r in runs))
+    runs = tuple(replace(_steered(run, found, words), vehicle=car) for run in runs)
+    return found, replace(imported, recordings=runs)
+
+
+def _steered(recording: Recording, found: Identified, words: list[str]) -> Recording:
+    """Return a run with the steering angle that its tyres were identified with."""
+    scale, offset = (found.values.get(name) for name in ("steer_scale", "steer_offset"))
+    if scale is None or offset is None:
+        return recording
+    spread = found.deviations
+    near = abs(scale - 1.0) <= 2.0 * spread["steer_scale"]
+    if near and abs(offset) <= 2.0 * spread["steer_offset"]:
+        return recording
+    seen = recording.observations.copy()
+    seen["steer_angle"] = scale * seen["steer_angle"] + offset
+    said = (
+        f"Methods got {scale:.4g} times the mapped steering angle {offset:+.2g} rad, as identified "
+        "with the tyres: mend scale and offset in the map."
+    )
+    if said not in words:
+        words.append(said)
+    return replace(recording, observations=seen)
+
+
+def _guesses(imported: ImportedLog) -> list[str]:
+    """Return in words what of the vehicle is a guess that the log did not replace."""
+    given = imported.provenance.channel_map.get("vehicle", "")
+    car = imported.recordings[0].vehicle
+    names = [
+        name
+        for name, about in (given.items() if isinstance(given, dict) else ())
+        if about.get("guess") and car.get(name) == about["value"]
+    ]
+    if not names:
+        return []
+    return [f"Of the vehicle these are guesses, no data of this car: {', '.join(names)}."]
 
 
 def address(study: Study) -> str:

@@ -23,7 +23,12 @@ from gripbench.bench.catalogue.scenarios import find_scenario
 from gripbench.bench.running.execution import missing
 from gripbench.bench.running.exporting import FORMATS, Drive, digest_of_samples, read_records
 from gripbench.bench.running.fingerprints import versions, world_digest
-from gripbench.bench.running.recorded_scenarios import RecordedScenario, judged, recording_of
+from gripbench.bench.running.recorded_scenarios import (
+    RecordedScenario,
+    judged,
+    log_window,
+    recording_of,
+)
 from gripbench.bench.running.rows import Row, Status
 from gripbench.bench.running.store import Store
 from gripbench.bench.scoring.scoring import DivergedError, Scores, score, targets_of
@@ -120,13 +125,14 @@ def submit(
                 f"{', '.join(outputs)}; give the same in all"
             )
         result = _scored(found, declaration, recording, scenario)
-        rows.append(_row(scenario, drive, declaration, result))
+        rows.append(_row(scenario, drive, declaration, result, recording))
     if declaration is None:
         raise InputError(f"{folder}: no drive gives all of {', '.join(channels)}")
     for scenario, drive, recording in lacking:
         reason = missing(declaration, recording.vehicle, recording.observations.dtype.names or ())
         targets = targets_of(declaration.estimates, recording)
-        rows.append(_row(scenario, drive, declaration, _Result("skipped", reason, targets)))
+        result = _Result("skipped", reason, targets)
+        rows.append(_row(scenario, drive, declaration, result, recording))
     for row in rows:
         before = store.read(row.scenario, row.label, row.seed)
         if before is not None and not before.computed_outside:
@@ -324,7 +330,13 @@ def _scored(
     return _Result("ok", "", tuple(scores), scores, content)
 
 
-def _row(scenario: Scenario, drive: Drive, declaration: Declaration, result: _Result) -> Row:
+def _row(
+    scenario: Scenario,
+    drive: Drive,
+    declaration: Declaration,
+    result: _Result,
+    recording: Recording,
+) -> Row:
     reads, outputs = repr(declaration.sensors), repr(declaration.outputs)
     return Row(
         key=digest(drive.world, "outside", declaration.name, reads, outputs, result.content),
@@ -342,5 +354,6 @@ def _row(scenario: Scenario, drive: Drive, declaration: Declaration, result: _Re
         scores=dict(result.scores or {}),
         sample_period=scenario.sample_time,
         computed_outside=True,
+        window=log_window(recording),
         versions=versions(),
     )

@@ -25,7 +25,7 @@ from gripbench.bench.scoring.scoring import DivergedError, check_estimates
 from gripbench.envs.recordings import Recording
 from gripbench.envs.signals import signal
 from gripbench.errors import InputError, unknown
-from gripbench.logs.identification import inside
+from gripbench.logs.vehicle.identification import inside
 from gripbench.methods.settings import Parameter
 from gripbench.writing import write_atomically
 
@@ -277,9 +277,7 @@ def _simplex(start: Floats) -> Floats:
     return np.vstack([start, start + np.diag(steps)])
 
 
-def tune_recording(
-    place: str, method: str, target: str, draws: int = BUDGET, folder: Path | None = None
-) -> Tuned:
+def tune_recording(place: str, method: str, target: str, draws: int = BUDGET) -> Tuned:
     """Tune a method on a recording; settings of its map that are no noise level stay.
 
     Parameters
@@ -288,10 +286,8 @@ def tune_recording(
         Name, folder or map of the recording, see `recorded_scenarios.recorded_scenario`.
     method, target, draws
         See `tune`.
-    folder
-        Where the files of published recordings lie, see `gripbench.logs.locations`.
     """
-    imported = imported_of(place, folder)
+    imported = imported_of(place)
     settings = imported.provenance.channel_map.get("settings", {})
     known = settings.get(method.partition(":")[0], {})
     fixed = {key: value for key, value in known.items() if not key.endswith(NOISE_LEVELS)}

@@ -69,6 +69,9 @@ class Context:
         The method's own variance of the estimate, shape (n,); None where it gives none.
     channels
         Function that returns a channel of the truth, shape (n,), or None where there is none.
+    bounded
+        Whether only an interval is known of the signal; the truth is its point next to the
+        estimate.
     """
 
     target: str
@@ -76,6 +79,7 @@ class Context:
     notes: Mapping[str, float]
     variance: Floats | None
     channels: Callable[[str], Floats | None]
+    bounded: bool = False
 
     @property
     def utilisation(self) -> Floats | None:

@@ -80,6 +80,7 @@ def score(
         if first >= 0:
             raise DivergedError(f"{name} is {estimates[name][first]} from t = {times[first]:.6g} s")
     inside = times >= recording.score_from
+    bounded = {bound.signal for bound in recording.bounds}
     scores = {}
     for name in targets:
         counted = inside & np.isfinite(truth[name])
@@ -96,6 +97,7 @@ def score(
             notes=recording.notes,
             variance=estimates[variance][counted] if variance in outputs else None,
             channels=_Channels(truth, counted),
+            bounded=name in bounded,
         )
         values = {
             metric.name: metric.of_run(times[counted], estimate, true, context)

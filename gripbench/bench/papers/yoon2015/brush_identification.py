@@ -21,6 +21,7 @@ from scipy.optimize import least_squares
 from gripbench.envs.recordings import Recording
 from gripbench.envs.vehicles import GRAVITY
 from gripbench.errors import InputError
+from gripbench.logs.vehicle.brush_fit import brush_force, covariance, slip_angles
 
 Array = npt.NDArray[np.float64]
 
@@ -77,26 +78,6 @@ class Identification:
     samples: int
 
 
-def brush_lateral_force(slip_angle: Array, mu: float, load: float, stiffness: float) -> Array:
-    """Return the lateral force of an axle with brush tyres [N], eq. 15.
-
-    Parameters
-    ----------
-    slip_angle
-        Slip angle [rad], shape (n,).
-    mu
-        Friction coefficient.
-    load
-        Vertical load of the axle [N].
-    stiffness
-        Force over slip angle at zero slip [N/rad].
-    """
-    share = np.clip(stiffness * np.tan(slip_angle) / (3.0 * mu * load), -1.0, 1.0)
-    size = np.abs(share)
-    force: Array = 3.0 * mu * load * share * (1.0 - size + size**2 / 3.0)
-    return force
-
-
 def modelled_acceleration(
     test: LateralTest, vehicle: Mapping[str, float], parameters: Array
 ) -> Array:
@@ -104,12 +85,9 @@ def modelled_acceleration(
     front, rear, mu = parameters
     wheelbase = vehicle["cg_to_front"] + vehicle["cg_to_rear"]
     weight = vehicle["mass"] * GRAVITY
-    at_front = brush_lateral_force(
-        test.slip_front, mu, weight * vehicle["cg_to_rear"] / wheelbase, front
-    )
-    at_rear = brush_lateral_force(
-        test.slip_rear, mu, weight * vehicle["cg_to_front"] / wheelbase, rear
-    )
+    grip = mu * weight / wheelbase
+    at_front = brush_force(test.slip_front, front, grip * vehicle["cg_to_rear"])
+    at_rear = brush_force(test.slip_rear, rear, grip * vehicle["cg_to_front"])
     return (at_front * np.cos(test.steer) + at_rear) / vehicle["mass"]
 
 
@@ -131,9 +109,10 @@ def lateral_test(recording: Recording, every: int = 1) -> LateralTest:
     speed_x, speed_y = truth["speed_x"][scored], truth["speed_y"][scored]
     yaw_rate, steer = seen["yaw_rate"][scored], seen["steer_angle"][scored]
     ahead, behind = recording.vehicle["cg_to_front"], recording.vehicle["cg_to_rear"]
+    front, rear = slip_angles(speed_x, speed_y, yaw_rate, steer, ahead, behind)
     return LateralTest(
-        slip_front=steer - np.arctan2(speed_y + ahead * yaw_rate, speed_x),
-        slip_rear=-np.arctan2(speed_y - behind * yaw_rate, speed_x),
+        slip_front=front,
+        slip_rear=rear,
         steer=steer,
         accel_y=seen["accel_y"][scored] - GRAVITY * np.sin(truth["suspension_roll"][scored]),
     )
@@ -183,12 +162,13 @@ def identify(tests: list[LateralTest], vehicle: Mapping[str, float]) -> Identifi
         jac="3-point",
     )
     independent = _independent_samples(fit.fun, [len(test.accel_y) for test in tests])
-    variance = float(fit.fun @ fit.fun) / max(independent - len(fit.x), 1.0)
-    covariance = _covariance(fit.jac * np.sqrt(independent / samples)) * variance
+    degrees = max(1.0 - len(fit.x) / independent, 1.0 / independent)
+    variance = float(np.mean(fit.fun**2)) / degrees
+    spread = covariance(np.asarray(fit.jac), variance, samples / independent)
     values = np.exp(fit.x[:3])
-    relative = np.sqrt(np.diag(covariance)[:3])
+    relative = np.sqrt(np.diag(spread)[:3])
     with np.errstate(invalid="ignore"):
-        correlation = covariance[:3, :3] / np.outer(relative, relative)
+        correlation = spread[:3, :3] / np.outer(relative, relative)
     return Identification(
         values=dict(zip(PARAMETERS, values.tolist(), strict=True)),
         standard_deviations=dict(zip(PARAMETERS, (values * relative).tolist(), strict=True)),
@@ -226,22 +206,13 @@ def separability(
 
     def force(logarithms: Array) -> Array:
         stiffness = 2.0 * np.exp(logarithms[0] + 2.0 * logarithms[1])
-        return brush_lateral_force(slip_angle, mu, load, stiffness)
+        return brush_force(slip_angle, float(stiffness), mu * load)
 
     at = np.log([tread_stiffness, half_length])
     small = 1e-6 * np.eye(2)
     jacobian = np.column_stack([(force(at + e) - force(at - e)) / 2e-6 for e in small])
     _, singular, directions = np.linalg.svd(jacobian, full_matrices=False)
     return float(singular[1] / singular[0]), directions[0] * np.sign(directions[0, 0])
-
-
-def _covariance(jacobian: Array) -> Array:
-    """Return (J' J)^-1; a direction that the samples do not excite has infinite variance."""
-    _, singular, directions = np.linalg.svd(jacobian, full_matrices=False)
-    if singular[-1] > 1e-9 * singular[0]:
-        inverse: Array = (directions.T / singular**2) @ directions
-        return inverse
-    return np.diag(np.full(jacobian.shape[1], np.inf))
 
 
 def _independent_samples(residuals: Array, lengths: list[int]) -> float:

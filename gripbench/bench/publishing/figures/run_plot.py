@@ -17,6 +17,7 @@ from gripbench.bench.publishing.figures.style import (
     new_figure,
     series_style,
 )
+from gripbench.bench.running.recorded_scenarios import log_window
 from gripbench.envs.signals import VARIANCE, difference, signal
 from gripbench.errors import InputError, unknown
 
@@ -71,7 +72,8 @@ def run_plot(
     name
         The signal.
     start, end
-        Part of the run [s]; all of it where none is given.
+        Part of the run [s]; all of it where none is given. Of a recording it is the window, and
+        times are those of the log's own clock.
 
     Raises
     ------
@@ -79,16 +81,23 @@ def run_plot(
         If the run has no such signal, a method does not estimate it, or the part is empty.
     """
     signal(name)
-    truth = runs.recording(scenario, seed).truth
+    recording = runs.recording(scenario, seed)
+    truth, window = recording.truth, log_window(recording)
     if name not in (truth.dtype.names or ()):
         raise unknown(f"signal in the truth of {scenario}", name, truth.dtype.names or ())
     time = truth["time"]
+    if window is not None:
+        time = time + recording.notes.get("time_origin", 0.0)
+        start = window.start if start is None else start
     shown = np.flatnonzero(
         (time >= (time[0] if start is None else start))
         & (time <= (time[-1] if end is None else end))
     )
     if len(shown) < 2:
-        raise InputError(f"{scenario} has no samples there: it runs to {time[-1]:g} s")
+        raise InputError(
+            f"{scenario} has no samples there: seed {seed} runs from {time[0]:.6g} to "
+            f"{time[-1]:.6g} s"
+        )
     shown = shown[:: max(1, len(shown) // MOST_POINTS)]
     scale, unit = axis_scale(name)
     figure = new_figure(5.0 if methods else 3.2)
@@ -114,10 +123,13 @@ def run_plot(
                 linewidth=0.0, zorder=2,
             )  # fmt: skip
     rows[0].set_ylabel(axis_label(name))
-    rows[-1].set_xlabel("Time [s]")
+    rows[-1].set_xlabel("Time [s]" if window is None else "Time of the log [s]")
     if methods:
         rows[1].axhline(0.0, color="#000000", linewidth=0.8)
         rows[1].set_ylabel("Error" if unit == "-" else f"Error [{unit}]")
     legend_above(rows[0], 2 if max(map(len, methods), default=0) > 24 else 3)
-    figure.suptitle(f"{scenario}, seed {seed}", fontsize=9.5, x=0.01, ha="left")
+    title = f"{scenario}, seed {seed}"
+    if window is not None:
+        title += f": run {window.run}, {window.start:.3f} to {window.end:.3f} s of the log's clock"
+    figure.suptitle(title, fontsize=9.5, x=0.01, ha="left")
     return figure

@@ -42,7 +42,7 @@ from gripbench.bench.ranking.degradation import degradation, without_faults
 from gripbench.bench.ranking.plans import plan_of, setting_of
 from gripbench.bench.ranking.ranking import Board
 from gripbench.bench.ranking.summary import not_run
-from gripbench.bench.running.recorded_scenarios import at_hand
+from gripbench.bench.running.recorded_scenarios import PREFIX, at_hand, recorded_scenario
 from gripbench.bench.running.store import read_rows
 from gripbench.errors import InputError
 from gripbench.writing import write_atomically
@@ -62,6 +62,7 @@ def write_report(
     workers: int = 1,
     advance: Callable[[int, int], None] = lambda done, total: None,
     methods: Sequence[str] = (),
+    recordings: Sequence[str] = (),
 ) -> Path:
     """Write the report of what is stored in a results folder.
 
@@ -85,6 +86,8 @@ def write_report(
         Called with scenarios done and their number.
     methods
         Methods from files of one's own, `file.py:Class` as they were run, so that they have curves.
+    recordings
+        Folders or maps of recordings that are not found by name, likewise.
 
     Raises
     ------
@@ -100,7 +103,8 @@ def write_report(
     rows = rows_of_suites(rows, suites)
     chosen = tuple(targets) or chosen_targets(rows, suites)
     own = {choose_method(method).label: method for method in methods}
-    plans = series_plans(without_faults(rows), chosen, shown_seeds, band_seeds, own)
+    places = {recorded_scenario(place).name: PREFIX + place for place in recordings}
+    plans = series_plans(without_faults(rows), chosen, shown_seeds, band_seeds, own, places)
     done = 0
 
     def count() -> None:
@@ -119,6 +123,7 @@ def series_plans(
     shown: int,
     band: int,
     own: Mapping[str, str] | None = None,
+    places: Mapping[str, str] | None = None,
 ) -> list[SeriesPlan]:
     """Return what to draw of each scenario: methods that ran there, on seeds that were run.
 
@@ -127,7 +132,8 @@ def series_plans(
     plans = []
     good = rows[(rows["status"] == "ok") & rows["target"].isin(targets)]
     for scenario, part in good.groupby("scenario", sort=False):
-        if not at_hand(str(scenario)):
+        place = (places or {}).get(str(scenario), str(scenario))
+        if not at_hand(place):
             continue
         seeds = tuple(int(seed) for seed in sorted(part["seed"].unique()))
         estimates = {
@@ -135,7 +141,9 @@ def series_plans(
             for target in targets
             if (part["target"] == target).any()
         }
-        plans.append(SeriesPlan(str(scenario), estimates, seeds[:shown], seeds[:band], own or {}))
+        plans.append(
+            SeriesPlan(str(scenario), estimates, seeds[:shown], seeds[:band], own or {}, place)
+        )
     return plans
 
 

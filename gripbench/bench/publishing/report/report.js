@@ -203,7 +203,10 @@
   const checked = new Set();
   const chooseScenario = () => {
     fill(byId("series-target"), Object.keys(seriesOf().truth), targetWords);
-    fill(byId("series-seed"), seriesOf().seeds);
+    fill(byId("series-seed"), seriesOf().seeds, (seed) => {
+      const window_ = seriesOf().windows[seed];
+      return window_ ? `${seed}: run ${window_.run}, ${window_.start.toFixed(2)} to ${window_.end.toFixed(2)} s` : seed;
+    });
     byId("series-from").value = byId("series-to").value = "";
     chooseMethods();
   };
@@ -231,9 +234,10 @@
     const seed = byId("series-seed").value;
     const { unit, turn } = data.targets[target];
     const difference = (value, true_) => (turn ? value - true_ - turn * Math.round((value - true_) / turn) : value - true_);
-    const time = unpack(content.time);
+    const window_ = content.windows[seed];
+    const time = unpack(content.time).map((t) => t + (window_ ? window_.start : 0));
     const truth = unpack(content.truth[target][seed]);
-    byId("series-band").textContent = content.band_seeds;
+    byId("series-band").textContent = content.band_seeds || "no";
     const traces = [{ x: time, y: truth, name: "Truth", mode: "lines", line: { color: colour("--text"), width: 4 } }];
     for (const [label, seeds] of Object.entries(content.estimates[target] ?? {})) {
       if (!checked.has(label) || !seeds[seed]) continue;
@@ -257,7 +261,7 @@
     const range = [Number.isNaN(from) ? time[0] : from, Number.isNaN(to) ? time[time.length - 1] : to];
     const title = (words) => (unit ? `${words} [${unit}]` : words);
     react("series-plot", traces, layout({
-      xaxis: axis("Time [s]", { anchor: "y2", range }),
+      xaxis: axis(window_ ? "Time of the log [s]" : "Time [s]", { anchor: "y2", range }),
       yaxis: axis(title(target), { domain: [0.44, 1] }),
       yaxis2: axis(title("error"), { domain: [0, 0.38] }),
       legend: { orientation: "h", y: 1.02, yanchor: "bottom" },

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from gripbench.bench.catalogue.scenarios import find_scenario
 from gripbench.bench.publishing.figures.runs import Runs
 from gripbench.bench.publishing.figures.style import axis_scale
+from gripbench.bench.running.recorded_scenarios import log_window
 from gripbench.bench.scoring.scoring import on_branch
 from gripbench.errors import GripbenchError
 
@@ -44,6 +45,8 @@ class SeriesPlan:
         Seeds over which error bands are taken.
     own
         What to choose for the labels of methods from files.
+    place
+        What to choose for the scenario: the folder or map of a recording; empty: its name.
     """
 
     scenario: str
@@ -51,6 +54,7 @@ class SeriesPlan:
     shown: tuple[int, ...]
     band: tuple[int, ...]
     own: Mapping[str, str] = field(default_factory=dict)
+    place: str = ""
 
 
 def packed(values: Floats) -> dict[str, Any]:
@@ -110,33 +114,44 @@ def series_of(plan: SeriesPlan) -> dict[str, Any]:
     Returns
     -------
     `time` packed, `seeds`, `band_seeds` (their number), `truth[target][seed]`,
-    `estimates[target][label][seed]` and `bands[target][label]`, a list for `BAND`.
+    `estimates[target][label][seed]` and `bands[target][label]`, a list for `BAND`. Of a recording
+    `time` counts from the start of a window, `windows[seed]` says where that is on the log's own
+    clock, and there are no bands: windows have nothing in common.
     """
-    times = np.linspace(0.0, find_scenario(plan.scenario).horizon, POINTS)
-    runs = Runs()
+    runs, place = Runs(), plan.place or plan.scenario
+    windows = {}
+    for seed in plan.shown:
+        window = log_window(runs.recording(place, seed))
+        if window is not None:
+            windows[str(seed)] = window.model_dump()
+    longest = max((one["end"] - one["start"] for one in windows.values()), default=None)
+    times = np.linspace(0.0, longest or find_scenario(place).horizon, POINTS)
+    band = () if windows else plan.band
     truth: dict[str, dict[str, Any]] = {}
     estimates: dict[str, dict[str, dict[str, Any]]] = {}
     errors: dict[tuple[str, str], list[Floats]] = {}
-    for seed in dict.fromkeys((*plan.shown, *plan.band)):
-        recording = runs.recording(plan.scenario, seed).truth
+    for seed in dict.fromkeys((*plan.shown, *band)):
+        made_there = runs.recording(place, seed)
+        recording = made_there.truth
+        wanted = times + made_there.score_from if windows else times
         for target, labels in plan.estimates.items():
             scale = axis_scale(target)[0]
             if target in (recording.dtype.names or ()):
-                true = scale * at_times(recording["time"], recording[target], times)
+                true = scale * at_times(recording["time"], recording[target], wanted)
             else:  # a window of a log in which no instrument gave it
                 true = np.full(POINTS, np.nan)
             if seed in plan.shown:
                 truth.setdefault(target, {})[str(seed)] = packed(true)
             for label in labels:
                 try:
-                    made = runs.estimates(plan.scenario, plan.own.get(label, label), seed)[target]
+                    made = runs.estimates(place, plan.own.get(label, label), seed)[target]
                 except GripbenchError:
                     continue  # it failed, as another section says, or its file is not at hand
-                value = scale * at_times(recording["time"], made, times)
+                value = scale * at_times(recording["time"], made, wanted)
                 if seed in plan.shown:
                     of_label = estimates.setdefault(target, {}).setdefault(label, {})
                     of_label[str(seed)] = packed(value)
-                if seed in plan.band:
+                if seed in band:
                     branch = on_branch(target, value / scale, true / scale)
                     errors.setdefault((target, label), []).append(scale * branch - true)
         runs.forget()
@@ -147,7 +162,8 @@ def series_of(plan: SeriesPlan) -> dict[str, Any]:
     return {
         "time": packed(times),
         "seeds": list(plan.shown),
-        "band_seeds": len(plan.band),
+        "band_seeds": len(band),
+        "windows": windows,
         "truth": truth,
         "estimates": estimates,
         "bands": bands,

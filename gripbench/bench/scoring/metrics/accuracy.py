@@ -1,4 +1,4 @@
-"""Errors of one run into RMS, largest error and mean error."""
+"""Errors of one run into RMS, largest error and mean error; estimates into their mean."""
 
 from __future__ import annotations
 
@@ -23,8 +23,21 @@ def bias(time: Floats, estimate: Floats, truth: Floats, context: Context) -> tup
     return running_total(estimate - truth), len(truth)
 
 
+def mean_estimate(
+    time: Floats, estimate: Floats, truth: Floats, context: Context
+) -> tuple[float, int] | None:
+    """Return the sum of the estimates where only an interval is known of the signal."""
+    return (running_total(estimate), len(estimate)) if context.bounded else None
+
+
 METRICS = (
     Metric("rms", "RMS", "Root mean square error", squares, "root_mean"),
     Metric("peak", "Peak", "Largest absolute error of all runs", peak, "maximum"),
     Metric("bias", "Bias", "Mean of estimate minus truth", bias, "mean", format="+.3g"),
+    Metric(
+        "mean_estimate",
+        "Mean",
+        "Mean estimate, where only an interval is known of the signal",
+        mean_estimate,
+    ),
 )

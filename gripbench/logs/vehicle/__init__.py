@@ -1,0 +1,1 @@
+"""Recordings in, what they tell of their vehicle and its sensors out."""
