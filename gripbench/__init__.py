@@ -38,6 +38,8 @@ if TYPE_CHECKING:
         Variant,
         compiled,
     )
+    from gripbench.methods.foreign.fmu import Fmu
+    from gripbench.methods.foreign.onnx_model import OnnxModel
     from gripbench.methods.foreign.program import Program
     from gripbench.methods.foreign.shared_library import SharedLibrary
 
@@ -57,6 +59,8 @@ __version__ = "0.1.0"
 DEFINED_IN = {
     "CompiledMethod": "gripbench.methods.contract",
     "Estimator": "gripbench.methods.contract",
+    "Fmu": "gripbench.methods.foreign.fmu",
+    "OnnxModel": "gripbench.methods.foreign.onnx_model",
     "Parameter": "gripbench.methods.contract",
     "Program": "gripbench.methods.foreign.program",
     "SharedLibrary": "gripbench.methods.foreign.shared_library",
@@ -76,6 +80,8 @@ DEFINED_IN = {
 __all__ = [
     "CompiledMethod",
     "Estimator",
+    "Fmu",
+    "OnnxModel",
     "Parameter",
     "Program",
     "SharedLibrary",

@@ -8,7 +8,6 @@ the file and of all that it imports from the project.
 from __future__ import annotations
 
 import os
-import stat
 import tempfile
 from functools import cache
 from pathlib import Path
@@ -22,6 +21,7 @@ from numba.core.caching import (
 
 from gripbench.errors import InputError
 from gripbench.sources import imports_gripbench, in_project, source_digest
+from gripbench.writing import own_folder
 
 
 def _stamp(*paths: str) -> str:
@@ -75,11 +75,7 @@ class InTemporaryFolder(_Stamped, UserWideCacheLocator):
 
     def ensure_cache_path(self) -> None:
         """Make the folder; what lies there is executed, so nobody else may have made it."""
-        self._folder.mkdir(mode=0o700, exist_ok=True)
-        about = self._folder.lstat()
-        owner = getattr(os, "getuid", lambda: about.st_uid)()
-        if not stat.S_ISDIR(about.st_mode) or about.st_uid != owner or about.st_mode & 0o022:
-            raise OSError(f"{self._folder} is not this user's own")
+        own_folder(self._folder)
         super().ensure_cache_path()
 
     @classmethod

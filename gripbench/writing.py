@@ -136,3 +136,18 @@ def _remedy(error: OSError | ValueError) -> str:
     if code in (errno.ENOTDIR, errno.EEXIST):
         return "one of its folders is a file"
     return str(getattr(error, "strerror", None) or error).lower()
+
+
+def own_folder(path: Path) -> None:
+    """Make a folder for what is executed later: nobody else may have made it, or write into it.
+
+    Raises
+    ------
+    OSError
+        If it cannot be made, or is not this user's own.
+    """
+    path.mkdir(mode=0o700, exist_ok=True)
+    about = path.lstat()
+    owner = getattr(os, "getuid", lambda: about.st_uid)()
+    if not stat.S_ISDIR(about.st_mode) or about.st_uid != owner or about.st_mode & 0o022:
+        raise OSError(f"{path} is not this user's own")

@@ -150,6 +150,7 @@ class CompiledMethod:
                 name for name in self.vehicle_parameters if name not in names
             )
         self._records: drivers.Records | None = None
+        self._fitted: tuple[str, ...] = ()
 
     def reset(self, vehicle: Mapping[str, float], dt: float) -> None:
         """Start afresh for a vehicle; `dt` is not used, every sample carries its time."""
@@ -187,6 +188,16 @@ class CompiledMethod:
         Structured array, shape (n,), one field for each output.
         """
         return drivers.batch(self, self._fresh(vehicle, len(observations)), observations)
+
+    @property
+    def fitted(self) -> dict[str, Setting]:
+        """Parameters that its `fit` found, where it has one: settings from then on."""
+        return {name: self.settings[name] for name in self._fitted}
+
+    @fitted.setter
+    def fitted(self, found: Mapping[str, Setting]) -> None:
+        self.settings = checked_settings(self.name, self.parameters, self.settings, found)
+        self._fitted = tuple(found)
 
     @property
     def outputs(self) -> tuple[str, ...]:

@@ -10,12 +10,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import Any
 
 import numpy.typing as npt
 
+from gripbench.bench.catalogue.arrays import given_state
 from gripbench.bench.catalogue.declarations import Declaration, declaration_of, describe_error, make
 from gripbench.bench.catalogue.expectations import (
     CHECKS,
@@ -25,9 +26,16 @@ from gripbench.bench.catalogue.expectations import (
     Perform,
     Subject,
 )
-from gripbench.bench.catalogue.registry import find_method, is_isolated, split_choice
+from gripbench.bench.catalogue.registry import (
+    MethodSpec,
+    choose_method,
+    find_method,
+    is_isolated,
+    split_choice,
+)
 from gripbench.bench.catalogue.scenarios import all_scenario_files, find_scenario
 from gripbench.bench.running.execution import missing
+from gripbench.bench.running.fitting import fitted
 from gripbench.bench.running.isolation.limits import CellFailure, Limits
 from gripbench.bench.running.isolation.loading import Settings
 from gripbench.bench.running.isolation.sandbox import Sandbox
@@ -137,14 +145,18 @@ def _tried(
         name, chosen, given = split_choice(method)
         source, variant, parameters = find_method(name), variant or chosen, given | parameters
         if is_isolated(source):
-            return _in_sandbox(Settings(source, variant, parameters), limits, stack)
+            return _in_sandbox(name, Settings(source, variant, parameters), limits, stack)
         method = source.load()
+    state = b""
 
     def create() -> Any:
-        return make(method, variant, parameters, getattr(method, "__name__", "method"))
+        made = make(method, variant, parameters, getattr(method, "__name__", "method"))
+        return given_state(made, state)
 
     instance = create()
     declaration = declaration_of(instance, variant, parameters)
+    if declaration.fits:
+        state = _fitted(choose_method(method, variant, parameters), limits)
 
     def here(
         form: str, vehicle: dict[str, float], observations: npt.NDArray[Any], period: float
@@ -155,11 +167,14 @@ def _tried(
     return _Tried(here, None, declaration, has_batch(instance), expected)
 
 
-def _in_sandbox(settings: Settings, limits: Limits, stack: ExitStack) -> _Tried:
+def _in_sandbox(name: str, settings: Settings, limits: Limits, stack: ExitStack) -> _Tried:
     sandbox, bounded = Sandbox(limits), Sandbox(limits, bounds=True)
     for item in (sandbox, bounded):
         stack.callback(item.close)
     loaded = sandbox.load(settings)
+    if loaded.declaration.fits:
+        spec = choose_method(name, settings.variant, settings.parameters)
+        settings = replace(settings, state=_fitted(spec, limits))
     return _Tried(
         partial(sandbox.perform, settings),
         partial(bounded.perform, settings),
@@ -167,6 +182,20 @@ def _in_sandbox(settings: Settings, limits: Limits, stack: ExitStack) -> _Tried:
         loaded.batch,
         loaded.expected_failures,
     )
+
+
+def _fitted(spec: MethodSpec, limits: Limits) -> bytes:
+    """Return what a method's `fit` makes of one drive of each of its training scenarios.
+
+    Raises
+    ------
+    CellFailure
+        If it fails.
+    """
+    found = fitted(spec, None, limits, each=1)
+    if found.unfitted:
+        raise CellFailure("failed", f"its fit failed: {found.unfitted}")
+    return found.state
 
 
 def failures(results: dict[str, str]) -> dict[str, str]:

@@ -15,6 +15,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, Literal
 
+from gripbench.bench.catalogue.training import checked_training, training_of
 from gripbench.envs.signals import SIGNALS, VARIANCE, signal
 from gripbench.errors import LONGEST, GripbenchError, InputError, nearest, one_line, unknown
 from gripbench.methods.contract import CompiledMethod
@@ -23,7 +24,7 @@ from gripbench.methods.settings import Variant
 
 @dataclass(frozen=True)
 class Declaration:
-    """What a method says of itself; see `gripbench.methods.contract` for the attributes."""
+    """What a method says of itself; see `gripbench.methods.contract` and `catalogue.training`."""
 
     name: str
     title: str
@@ -37,6 +38,11 @@ class Declaration:
     file: str
     baseline: bool = False
     files: tuple[str, ...] = ()
+    fits: bool = False
+    trained_on: tuple[str, ...] = ()
+    training_truth: tuple[str, ...] = ()
+    trained: dict[str, Any] | None = None
+    ranges: dict[str, tuple[float, float, float]] = field(default_factory=dict)
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -172,6 +178,7 @@ def declaration_of(
     given["settings"] = dict(method.settings) if compiled else dict(parameters)
     given["baseline"] = bool(getattr(method, "baseline", False))
     given["files"] = getattr(method, "files", ())
+    given |= training_of(method)
     given["file"] = str(getattr(module, "__file__", None) or "")
     return declaration_from(given, type(method).__name__)
 
@@ -237,6 +244,7 @@ def declaration_from(given: Mapping[str, Any], kind: str = "method") -> Declarat
         file=str(given.get("file") or ""),
         baseline=given.get("baseline") is True,
         files=_files(given, name),
+        **checked_training(given, name),
     )
 
 

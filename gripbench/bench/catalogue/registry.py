@@ -23,7 +23,9 @@ import cloudpickle  # type: ignore[import-untyped]
 from pydantic import Field
 
 from gripbench import methods as built_in
+from gripbench.bench.catalogue.arrays import given_state
 from gripbench.bench.catalogue.declarations import Declaration, Source, declaration_of
+from gripbench.bench.catalogue.training import Trained, declared
 from gripbench.configuration import Configuration, parse, read_toml
 from gripbench.errors import InputError, unknown
 from gripbench.extensions import entry_points
@@ -106,6 +108,10 @@ class MethodSpec:
         Digest of its source and settings.
     shown
         Label that tables show instead of the one that its settings make.
+    trained
+        How it was trained and what came of it; None: it was not, or not yet.
+    unfitted
+        Why its `fit` failed; empty: it did not.
     """
 
     source: Source
@@ -115,6 +121,8 @@ class MethodSpec:
     isolated: bool = True
     digest: str = ""
     shown: str = ""
+    trained: Trained | None = None
+    unfitted: str = ""
 
     @property
     def label(self) -> str:
@@ -129,9 +137,14 @@ class MethodSpec:
             text += "@" + ",".join(f"{key}={value}" for key, value in settings)
         return text
 
+    @property
+    def state(self) -> bytes:
+        """What its `fit` returned; empty: nothing is handed over."""
+        return self.trained.state if self.trained else b""
+
     def make(self) -> Any:
-        """Return a new estimator."""
-        return self.source.make(self.variant, self.parameters)
+        """Return a new estimator, with what its `fit` returned."""
+        return given_state(self.source.make(self.variant, self.parameters), self.state)
 
 
 def find_method(name: str) -> Source:
@@ -267,6 +280,7 @@ def choose_method(
         parameters=settings,
         isolated=isolated,
         digest=method_digest(source, declaration),
+        trained=declared(declaration.trained),
     )
 
 
@@ -297,7 +311,11 @@ def _named_variant(path: Path, settings: Mapping[str, Any]) -> MethodSpec:
         spec = choose_method(given.method, parameters=given.settings | dict(settings))
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    return replace(spec, shown=f"{given.method}@{given.name}")
+    training = given.record.get("training")
+    trained = spec.trained
+    if training is not None:
+        trained = declared({**training, "seconds": given.record.get("seconds")})
+    return replace(spec, shown=f"{given.method}@{given.name}", trained=trained)
 
 
 def is_isolated(source: Source) -> bool:

@@ -53,6 +53,8 @@ def sensitivity(
     from gripbench.bench.publishing.tables import show
     from gripbench.bench.ranking import sensitivity as study
     from gripbench.bench.running.api import seeds_of
+    from gripbench.bench.running.fitting import fitted
+    from gripbench.bench.running.isolation.limits import Limits
     from gripbench.errors import InputError
     from gripbench.writing import check_writable, write_atomically
 
@@ -71,6 +73,7 @@ def sensitivity(
     if export is not None:
         check_writable(export)
     ranges = study.ranges_of(scenarios, specs, cause or ())
+    specs = [fitted(spec, results, Limits()) for spec in specs]
     frame = study.sensitivity(scenarios, specs, target, ranges, seeds_of(seeds), workers)
     out = console()
 

@@ -16,7 +16,13 @@ from gripbench.bench.ranking.plans import plan_of
 from gripbench.bench.ranking.ranking import Board
 from gripbench.bench.ranking.resolution import resolution
 from gripbench.bench.ranking.skill import NO_BETTER
-from gripbench.bench.ranking.summary import FOOTNOTE, OUTSIDE_FOOTNOTE, marked
+from gripbench.bench.ranking.summary import (
+    FOOTNOTE,
+    MARKED_BY,
+    OUTSIDE_FOOTNOTE,
+    marked,
+    training_note,
+)
 from gripbench.bench.scoring.metric import SIGNAL_UNIT, Metric
 from gripbench.bench.scoring.metrics import metrics
 from gripbench.envs.signals import signal
@@ -105,6 +111,7 @@ def _wide(board: Board, relative: bool) -> tuple[Column, ...]:
             for column in _metric_columns(metric, board.target)
         ),
         *_runtime_columns(relative),
+        *((Column("training", "Trained"),) if board.lines["training"].any() else ()),
         Column("failures", "Failed", format="d"),
     ]
     if board.lines["failures"].any():
@@ -144,6 +151,8 @@ def _notes(board: Board, wide: bool) -> tuple[str, ...]:
         notes.append(FOOTNOTE + ".")
     if board.lines["computed_outside"].any():
         notes.append(OUTSIDE_FOOTNOTE + ".")
+    for line in board.lines[board.lines["training"] != ""].to_dict("records"):
+        notes.append(training_note(line["label"], line["training"], line["training_time"]) + ".")
     return tuple(notes)
 
 
@@ -346,7 +355,7 @@ def _metric_cells(line: Mapping[Any, Any], target: str) -> dict[str, Any]:
 def _name(line: Mapping[Any, Any]) -> str:
     """Return a method's label with the marks that stand below the table."""
     marks = (GUESS if line["baseline"] else "") + (NOT_BETTER if line["verdict"] else "")
-    name = marked(line["label"], line["idealised"], line["computed_outside"])
+    name = marked(line["label"], *(line[column] for column in MARKED_BY))
     return f"{name} {marks}" if marks else name
 
 

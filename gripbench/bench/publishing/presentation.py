@@ -12,7 +12,14 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 from rich.text import Text
 
-from gripbench.bench.ranking.summary import FOOTNOTE, OUTSIDE_FOOTNOTE, failures, marked
+from gripbench.bench.ranking.summary import (
+    FOOTNOTE,
+    MARKED_BY,
+    OUTSIDE_FOOTNOTE,
+    failures,
+    marked,
+    training_note,
+)
 from gripbench.envs.signals import signal
 from gripbench.errors import one_line
 
@@ -153,7 +160,7 @@ def _across(part: pd.DataFrame, factor: float) -> Table:
         table.add_column(scenario, justify="right", no_wrap=True)
     for label, lines in part.groupby("label", sort=False):
         texts = {line["scenario"]: cell(line, factor) for _, line in lines.iterrows()}
-        name = marked(str(label), *lines[["idealised", "computed_outside"]].iloc[0])
+        name = marked(str(label), *lines[[*MARKED_BY]].iloc[0])
         table.add_row(name, *(texts.get(scenario, "") for scenario in scenarios))
     return table
 
@@ -172,7 +179,7 @@ def _down(part: pd.DataFrame, factor: float, responds: bool) -> Table:
         table.add_section()
         table.add_row(Text(one_line(str(scenario)), "bold"))
         for line in shown:
-            name = marked(line["label"], line["idealised"], line["computed_outside"])
+            name = marked(line["label"], *line[[*MARKED_BY]])
             more = _response(line, factor) if responds else ()
             table.add_row(f"  {name}", cell(line, factor), *more)
     return table
@@ -208,7 +215,7 @@ def _jumps(part: pd.DataFrame) -> Table:
         table.add_row(Text(one_line(str(scenario)), "bold"))
         for _, line in lines.iterrows():
             table.add_row(
-                f"  {marked(line['label'], line['idealised'], line['computed_outside'])}",
+                f"  {marked(line['label'], *line[[*MARKED_BY]])}",
                 seconds(line["jump_delay"], line["jump_low"], line["jump_high"]),
                 f"{line['jump_settled']:.0f}/{line['jumps']:.0f}",
             )
@@ -225,6 +232,9 @@ def print_summary(summary: pd.DataFrame) -> None:
         out.print(FOOTNOTE)
     if summary["computed_outside"].any():
         out.print(OUTSIDE_FOOTNOTE)
+    for label, group in summary[summary["training"] != ""].groupby("label", sort=False):
+        note = training_note(str(label), *group[["training", "training_time"]].iloc[0])
+        out.print(note, markup=False, highlight=False, soft_wrap=True)
 
 
 def print_failures(rows: pd.DataFrame, stderr: bool = False) -> None:

@@ -10,7 +10,7 @@ import pandas as pd
 
 from gripbench.bench.ranking import statistics
 from gripbench.bench.ranking.grids import instruments
-from gripbench.bench.ranking.summary import outside_of
+from gripbench.bench.ranking.summary import outside_of, training_of
 from gripbench.bench.scoring.metric import Metric, pooled_rms
 from gripbench.bench.scoring.metrics import metrics
 
@@ -44,6 +44,7 @@ def method_line(group: pd.DataFrame, complete: bool, settings: Settings) -> dict
     }
     line |= {
         "computed_outside": bool(outside_of(group).any()),
+        **dict(zip(("training", "training_time"), training_of(group), strict=True)),
         "reads": ", ".join(instruments(first["sensors"])),
         "rms": pooled_rms(good["sum_of_squares"], good["count"]) if complete else np.nan,
         "rms_from": low,

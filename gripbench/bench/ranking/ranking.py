@@ -41,13 +41,14 @@ from gripbench.errors import InputError, unknown
 
 _BEFORE = (
     "target", "sensors", "rank", "rank_from", "rank_to", "group", "label", "method", "variant",
-    "title", "reads", "idealised", "baseline", "computed_outside", "score", "score_from",
+    "title", "reads", "idealised", "baseline", "computed_outside", "training", "score",
+    "score_from",
     "score_to", "elsewhere_from", "elsewhere_to", "skill", "verdict", "beats_guess", "beats_next",
     "worse_than_guess", "rms", "rms_from", "rms_to",
 )  # fmt: skip
 _SCORES = ("score", "score_from", "score_to", "elsewhere_from", "elsewhere_to")
 _BEHIND = (
-    "step_batch", "step_p50", "step_p99", "step_max", "deadline_misses", "pareto",
+    "training_time", "step_batch", "step_p50", "step_p99", "step_max", "deadline_misses", "pareto",
     "failures", "reason", "cells", "seeds", "scenarios",
 )  # fmt: skip
 

@@ -21,6 +21,12 @@ FOOTNOTE = f"{MARK} reads an idealised channel, which no sensor in a vehicle giv
 OUTSIDE = "‡"
 """Follows the name of a method whose estimates were handed in."""
 
+MARKED_BY = ("idealised", "computed_outside", "training")
+"""Columns that decide on a method's marks, in the order in which `marked` takes them."""
+
+TRAINED = "§"
+"""Follows the name of a method that was trained."""
+
 OUTSIDE_FOOTNOTE = f"{OUTSIDE} computed outside: neither causality nor runtime checked"
 
 
@@ -34,8 +40,8 @@ def summary(rows: pd.DataFrame) -> pd.DataFrame:
 
     Returns
     -------
-    Frame with the columns `scenario, target, label, idealised, computed_outside, runs, ok, status,
-    rms, low, high`:
+    Frame with the columns `scenario, target, label, idealised, computed_outside, training,
+    training_time, runs, ok, status, rms, low, high`:
     `rms` is pooled over the runs that are `ok` by the mean of squares, `low` and `high` bound its
     95 % interval (over runs, see `statistics.pooled_rms_interval`), `status` counts the others.
     For the available friction also, over the runs that are excited, `excited, excited_rms,
@@ -59,6 +65,7 @@ def summary(rows: pd.DataFrame) -> pd.DataFrame:
                 "label": label,
                 "idealised": str(group["idealised"].iloc[0]),
                 "computed_outside": bool(outside_of(group).any()),
+                **dict(zip(("training", "training_time"), training_of(group), strict=True)),
                 "runs": len(group),
                 "ok": len(good),
                 "status": ", ".join(f"{count} {status}" for status, count in others.items()),
@@ -69,7 +76,8 @@ def summary(rows: pd.DataFrame) -> pd.DataFrame:
             }
         )
     columns = (
-        "scenario", "target", "label", "idealised", "computed_outside", "runs", "ok", "status",
+        "scenario", "target", "label", "idealised", "computed_outside", "training",
+        "training_time", "runs", "ok", "status",
         "rms", "low", "high",
         "excited", "excited_rms", "excited_low", "excited_high",
         "settled", "delay", "delay_low", "delay_high",
@@ -116,7 +124,9 @@ def _mean_of_settled(delays: np.ndarray) -> tuple[int, float, float, float]:
     return len(finite), mean, float(low), float(high)
 
 
-def marked(label: str, idealised: str | tuple[str, ...], outside: bool = False) -> str:
+def marked(
+    label: str, idealised: str | tuple[str, ...], outside: bool = False, training: str = ""
+) -> str:
     """Return a method's label with its marks.
 
     Parameters
@@ -127,8 +137,25 @@ def marked(label: str, idealised: str | tuple[str, ...], outside: bool = False) 
         Idealised channels that it reads.
     outside
         Whether its estimates were handed in.
+    training
+        How it was trained.
     """
-    return label + (MARK if idealised else "") + (OUTSIDE if outside else "")
+    marks = ((MARK, idealised), (OUTSIDE, outside), (TRAINED, training))
+    return label + "".join(mark for mark, there in marks if there)
+
+
+def training_of(rows: pd.DataFrame) -> tuple[str, float]:
+    """Return how the method of these rows was trained, and how long it took [s]; old rows: `""`."""
+    if "training" not in rows:
+        return "", math.nan
+    said = [text for text in rows["training"].fillna("").astype(str) if text]
+    return (said[-1] if said else ""), float(rows["training_time"].astype(float).median())
+
+
+def training_note(label: str, training: str, seconds: float) -> str:
+    """Return the sentence on a method's training."""
+    took = "" if math.isnan(seconds) else f", in {seconds:.3g} s"
+    return f"{label}{TRAINED} {training}{took}"
 
 
 def outside_of(rows: pd.DataFrame) -> pd.Series:
@@ -157,7 +184,9 @@ def failures(rows: pd.DataFrame) -> pd.DataFrame:
     return grouped.agg(runs="size", first_seed="min").reset_index()
 
 
-MEASURED = ("step_batch", "step_p50", "step_p99", "step_max", "deadline_misses")
+MEASURED = (
+    "step_batch", "step_p50", "step_p99", "step_max", "deadline_misses", "training_time"
+)  # fmt: skip
 """Columns that differ from one run of the same cell to the next."""
 
 

@@ -78,7 +78,9 @@ class Cell:
 
 def cell_of(scenario: Scenario, seed: int, method: MethodSpec, world: str) -> Cell:
     """Return a cell with its key: world, versions, source and settings of the method, and seed."""
-    key = digest(world, repr(sorted(versions().items())), method.digest, str(seed))
+    learned = [method.trained.digest] if method.trained and method.trained.digest else []
+    learned += ["unfitted"] if method.unfitted else []
+    key = digest(world, repr(sorted(versions().items())), method.digest, str(seed), *learned)
     return Cell(scenario, seed, method, world, key)
 
 
@@ -216,6 +218,9 @@ def run_cell(
         reason = "the scenario has no truth for any of its estimates"
     if reason:
         return _row(cell, targets, "skipped", reason)
+    if cell.method.unfitted:
+        reason = f"its fit failed: {cell.method.unfitted}"
+        return _row(cell, targets, "failed", reason).model_copy(update={"passing": True})
     read: Mapping[str, Any] = {}
     try:
         if passed is None:
@@ -248,7 +253,10 @@ def run_cell(
     except Exception as error:
         return _resting_on(cell, _row(cell, targets, "failed", describe_error(error)), read)
     row = _row(cell, tuple(scores), "ok", "")
-    row = row.model_copy(update={"scores": scores, "runtime": outcome.runtime})
+    trained = cell.method.trained
+    training = {"training": trained.seconds if trained else None}
+    runtime = outcome.runtime.model_copy(update=training)
+    row = row.model_copy(update={"scores": scores, "runtime": runtime})
     return _resting_on(cell, row, outcome.read)
 
 
@@ -284,7 +292,7 @@ def _outcome(cell: Cell, recording: Recording, limits: Limits, timed: bool) -> O
             period,
             timed,
         )
-    return _sandbox(spec.source, spec.digest, limits).execute(
+    return _sandbox(spec, limits).execute(
         spec.source,
         spec.declaration,
         spec.variant,
@@ -292,6 +300,7 @@ def _outcome(cell: Cell, recording: Recording, limits: Limits, timed: bool) -> O
         recording.vehicle,
         recording.observations,
         period,
+        spec.state,
     )
 
 
@@ -315,6 +324,7 @@ def _row(cell: Cell, targets: tuple[str, ...], status: Status, reason: str) -> R
         reason=reason,
         sample_period=cell.scenario.sample_time,
         method_digest=cell.method.digest if cell.method.isolated else "",
+        training=cell.method.trained.training if cell.method.trained else None,
         versions=versions(),
     )
 
@@ -322,12 +332,12 @@ def _row(cell: Cell, targets: tuple[str, ...], status: Status, reason: str) -> R
 MOST_SANDBOXES = 8
 """Largest number of plug-ins whose processes wait for their next cell."""
 
-_sandboxes: dict[tuple[Source, str, Limits], Sandbox] = {}
+_sandboxes: dict[tuple[Source, str, str, Limits], Sandbox] = {}
 
 
-def _sandbox(source: Source, digest: str, limits: Limits) -> Sandbox:
-    """Return this process's sandbox of a method in one state of its source."""
-    key = (source, digest, limits)
+def _sandbox(spec: MethodSpec, limits: Limits) -> Sandbox:
+    """Return this process's sandbox of a method in one state of its source and training."""
+    key = (spec.source, spec.digest, spec.trained.digest if spec.trained else "", limits)
     if key not in _sandboxes:
         while len(_sandboxes) >= MOST_SANDBOXES:
             _sandboxes.pop(next(iter(_sandboxes))).close()

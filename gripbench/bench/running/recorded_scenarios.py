@@ -201,6 +201,11 @@ def on_recording(spec: MethodSpec, scenario: Scenario) -> MethodSpec:
     given = scenario.settings if isinstance(scenario, RecordedScenario) else {}
     if spec.declaration.name not in given:
         return spec
+    if spec.declaration.fits:
+        raise InputError(
+            f"{scenario.name}: key 'settings.{spec.declaration.name}': a method that is fitted has "
+            "the settings that it was fitted with; remove it"
+        )
     settings = given[spec.declaration.name] | spec.parameters
     from gripbench.bench.catalogue.registry import method_digest
 

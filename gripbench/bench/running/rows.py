@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
+from gripbench.bench.catalogue.training import Training
 from gripbench.bench.scoring.metric import Value
 from gripbench.bench.scoring.metrics import metrics
 from gripbench.configuration import Configuration, parse
@@ -21,7 +22,7 @@ from gripbench.errors import LONGEST, InputError, one_line
 if TYPE_CHECKING:
     import pandas as pd
 
-SCHEMA_VERSION = 6
+SCHEMA_VERSION = 7
 """Version of the stored form; rows of every earlier version still load (see `_MIGRATIONS`)."""
 
 Text = Annotated[str, BeforeValidator(lambda text: _storable(text))]
@@ -51,6 +52,8 @@ class Runtime(Configuration):
         Number of single calls behind the quantiles.
     deadline_misses
         Share of those calls that took longer than the sample period.
+    training
+        Time that the method's training took; None: it was not trained, or nobody says.
     """
 
     batch: float
@@ -59,6 +62,7 @@ class Runtime(Configuration):
     maximum: float | None = None
     samples: int = 0
     deadline_misses: float | None = None
+    training: float | None = None
 
 
 class LogWindow(Configuration):
@@ -116,6 +120,8 @@ class Row(Configuration):
         Whether the estimates were handed in: neither causality nor runtime was checked.
     window
         Of a recording, what part of the log was scored.
+    training
+        How the method was trained; None: it was not.
     method_digest
         Digest of source and settings of a plug-in; empty for a method that ships with gripbench.
     checked
@@ -152,6 +158,7 @@ class Row(Configuration):
     untracked: tuple[str, ...] = ()
     computed_outside: bool = False
     window: LogWindow | None = None
+    training: Training | None = None
     method_digest: str = ""
     checked: Checked = Field(default="", exclude=True)
     versions: dict[str, str] = Field(default_factory=dict)
@@ -214,6 +221,7 @@ _MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {
     3: _to_metrics,
     4: lambda content: {**content, "schema_version": 5},  # 5 added where it was computed
     5: lambda content: {**content, "schema_version": 6},  # 6 added the window of a log
+    6: lambda content: {**content, "schema_version": 7},  # 7 added how it was trained
 }
 """For each earlier version, the function that turns its content into the next version's."""
 
@@ -262,8 +270,9 @@ def frame_of(rows: Iterable[Row]) -> pd.DataFrame:
     vanishes from a table made of the frame. Columns: `scenario, seed, label, method, variant,
     title, target, status, reason`, the columns of each metric, `sample_period, step_batch,
     step_p50, step_p99, step_max, deadline_misses, sensors, idealised, parameters, baseline,
-    world, key, checked, computed_outside, log_run, log_from, log_to`; the last three say which run
-    and what interval [s] on a log's own clock was scored, NaN for a simulated run.
+    world, key, checked, computed_outside, log_run, log_from, log_to, training, training_time`: the
+    three of a log say which run and what interval [s] on its own clock was scored, NaN for a
+    simulated run; the last two how the method was trained, in words, and how long that took [s].
 
     A metric has a column of its name; one that is pooled by totals also `<name>_total` and
     `<name>_count`, which for the RMS are called `sum_of_squares` and `count`. NaN: the metric has
@@ -296,7 +305,7 @@ _COMMON = (
     "scenario", "seed", "label", "method", "variant", "title", "status", "reason",
     "sample_period", "step_batch", "step_p50", "step_p99", "step_max", "deadline_misses",
     "sensors", "idealised", "parameters", "baseline", "world", "key", "checked",
-    "computed_outside", *LOG_WINDOW,
+    "computed_outside", *LOG_WINDOW, "training", "training_time",
 )  # fmt: skip
 
 
@@ -328,6 +337,8 @@ def _common_columns(row: Row) -> dict[str, Any]:
         "log_run": float(window.run) if window else math.nan,
         "log_from": window.start if window else math.nan,
         "log_to": window.end if window else math.nan,
+        "training": row.training.text if row.training else "",
+        "training_time": runtime.training if runtime else None,
     }
 
 

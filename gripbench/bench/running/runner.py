@@ -10,17 +10,19 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import groupby, islice
 from typing import Any
 
 import numba
 
 from gripbench.bench.catalogue.registry import MethodSpec
+from gripbench.bench.catalogue.training import check_test_seeds
 from gripbench.bench.running.backends import Backend, WorkerLostError
 from gripbench.bench.running.cells import Cell, Task, cell_of, close_sandboxes, run_tasks
 from gripbench.bench.running.dependencies import folder_of, unchanged
 from gripbench.bench.running.fingerprints import world_digest
+from gripbench.bench.running.fitting import fitted
 from gripbench.bench.running.isolation.limits import Limits
 from gripbench.bench.running.isolation.processes import stop_starters
 from gripbench.bench.running.recorded_scenarios import RecordedScenario, on_recording
@@ -134,8 +136,15 @@ def run_plan(
     backend, limits = backend or Backend(), limits or Limits()
     _check_labels(plan)
     _check_process()
+    _check_training(plan)
     began = time.perf_counter()
     report = Report()
+    try:
+        learned = tuple(fitted(method, store.results, limits) for method in plan.methods)
+    finally:
+        stop_starters()
+    plan = replace(plan, methods=learned)
+    _check_training(plan)
     waiting = []
     for cell in plan.cells():
         if fresh:
@@ -236,6 +245,15 @@ def _check_process() -> None:
             "the environment variable NUMBA_DISABLE_JIT is set: methods and simulations are "
             "compiled and cannot run without; unset it"
         )
+
+
+def _check_training(plan: Plan) -> None:
+    """Check that no trained method is tested on what it may have been trained on."""
+    for method in plan.methods:
+        training = method.trained.training if method.trained else None
+        for scenario in plan.scenarios if training or method.declaration.fits else ():
+            if not isinstance(scenario, RecordedScenario):
+                check_test_seeds(method.label, training, plan.seeds_of(scenario))
 
 
 def _check_labels(plan: Plan) -> None:

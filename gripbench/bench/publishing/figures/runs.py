@@ -9,7 +9,10 @@ import numpy.typing as npt
 from gripbench.bench.catalogue.registry import MethodSpec, choose_method
 from gripbench.bench.catalogue.scenarios import find_scenario
 from gripbench.bench.running.execution import execute, missing
+from gripbench.bench.running.fitting import fitted
+from gripbench.bench.running.isolation.limits import Limits
 from gripbench.bench.running.recorded_scenarios import on_recording, recording_of
+from gripbench.bench.running.store import DEFAULT_RESULTS
 from gripbench.envs.recordings import Recording
 from gripbench.errors import InputError
 
@@ -32,7 +35,10 @@ class Runs:
     def method(self, name: str) -> MethodSpec:
         """Return a method by `name[:variant][@parameter=value,...]` or `file.py:Class`."""
         if name not in self._methods:
-            self._methods[name] = choose_method(name)
+            spec = fitted(choose_method(name), DEFAULT_RESULTS, Limits())
+            if spec.unfitted:
+                raise InputError(f"{spec.label}: its fit failed: {spec.unfitted}")
+            self._methods[name] = spec
         return self._methods[name]
 
     def forget(self) -> None:

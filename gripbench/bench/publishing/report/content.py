@@ -26,7 +26,7 @@ from gripbench.bench.ranking.plans import road_of, standing_of
 from gripbench.bench.ranking.ranking import Board, boards
 from gripbench.bench.ranking.resolution import resolution
 from gripbench.bench.ranking.statistics import performance_profile
-from gripbench.bench.ranking.summary import failures, marked, summary
+from gripbench.bench.ranking.summary import MARKED_BY, failures, marked, summary
 from gripbench.envs.instruments.faults import split_faults
 from gripbench.envs.signals import signal
 from gripbench.errors import InputError
@@ -139,7 +139,7 @@ def heat_map(rows: pd.DataFrame, target: str) -> dict[str, Any]:
     real = lines[(lines["idealised"] == "") & ~lines["computed_outside"].astype(bool)]
     best = (lines if real.empty else real).groupby("scenario")["rms"].min()
     marks = {
-        line["label"]: (line["idealised"], line["computed_outside"]) for _, line in lines.iterrows()
+        line["label"]: tuple(line[column] for column in MARKED_BY) for _, line in lines.iterrows()
     }
     factor = axis_scale(target)[0]
     ratio: list[list[float | None]] = []

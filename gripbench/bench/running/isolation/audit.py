@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 import gripbench
+from gripbench.methods.foreign.fmu import place_of_units
 
 ABSENT = "absent"
 """Stands for the digest of what is not there."""
@@ -58,6 +59,7 @@ class _Witness:
         self.made: set[str] = set()
         self.busy = threading.local()
         self.home = str(Path(gripbench.__file__).resolve().parent) + os.sep
+        self.units = str(place_of_units()) + os.sep  # copies of what a declared file holds
         self.program = os.path.join(self.home, "methods", "foreign", "program.py")
 
     def __call__(self, event: str, arguments: tuple[Any, ...]) -> None:
@@ -82,7 +84,7 @@ class _Witness:
 
     def foreign(self, path: str) -> bool:
         """Tell whether a file belongs to Python, an installed package or gripbench."""
-        return path.startswith((*_PLACES, self.home)) or _installed(path)
+        return path.startswith((*_PLACES, self.home, self.units)) or _installed(path)
 
     def asked(self) -> bool:
         """Tell whether the plug-in's own code asked, itself or through a library."""

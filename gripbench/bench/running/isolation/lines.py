@@ -10,7 +10,7 @@ import threading
 import time
 from typing import Any
 
-from gripbench.bench.running.isolation.messages import message_bytes
+from gripbench.bench.running.isolation.messages import message_bytes, read_message
 
 
 class LateError(Exception):
@@ -164,3 +164,42 @@ class _Pump:
         thread.join(max(deadline - time.monotonic(), 0.0))
         if not late:
             raise LateError
+
+
+class ServedLine:
+    """Two file descriptors, in and out; the other side's end ends this process."""
+
+    def __init__(self, read: int, write: int) -> None:
+        self.read, self.write = read, write
+
+    def receive(self, size: int) -> bytes:
+        """Return exactly so many bytes."""
+        content = os.read(self.read, size)
+        if len(content) == size:
+            return content
+        parts, left = [content], size - len(content)
+        while left:
+            parts.append(os.read(self.read, left))
+            left -= len(parts[-1])
+            if not parts[-1]:
+                os._exit(0)
+        return b"".join(parts)
+
+    def message(self) -> dict[str, Any]:
+        """Return the next message."""
+        return read_message(self.receive)
+
+    def send(self, content: dict[str, Any]) -> None:
+        """Write a message."""
+        self.put(message_bytes(content))
+
+    def put(self, content: bytes) -> None:
+        """Write bytes."""
+        view = memoryview(content)
+        while view:
+            view = view[os.write(self.write, view) :]
+
+    def close(self) -> None:
+        """Close both descriptors."""
+        for descriptor in {self.read, self.write}:
+            os.close(descriptor)

@@ -6,7 +6,7 @@ import base64
 import hashlib
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +19,12 @@ from gripbench.bench.running.isolation.limits import Limits
 
 @dataclass(frozen=True)
 class Settings:
-    """Which plug-in, and with what its constructor is called."""
+    """Which plug-in, with what its constructor is called, and what its `fit` returned, packed."""
 
     source: Source
     variant: str
     parameters: Mapping[str, Any]
+    state: bytes = field(default=b"", repr=False)
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,7 @@ def loading_message(settings: Settings, limits: Limits, bounds: bool) -> dict[st
         "path": _places(source.kind, folder),
         "seed": _digest(b"loading"),
         "bounds": bounds,
+        "state": len(settings.state),
     }
 
 
@@ -83,6 +85,11 @@ def generator_seed(declaration: Declaration, observations: npt.NDArray[Any]) -> 
     """
     first = [f"{value:.9g}" for value in observations[:1].view(np.float64).ravel()]
     return _digest(declaration.name.encode(), *(value.encode() for value in first))
+
+
+def named_seed(name: str, occasion: str) -> str:
+    """Return the seed of the global generators where a method is given no sample."""
+    return _digest(name.encode(), occasion.encode())
 
 
 def _digest(*parts: bytes) -> str:

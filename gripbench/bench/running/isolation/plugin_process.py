@@ -30,6 +30,7 @@ import numpy as np
 from numba.core.caching import NullCache
 from numba.core.dispatcher import Dispatcher
 
+from gripbench.bench.catalogue.arrays import given_state
 from gripbench.bench.catalogue.declarations import (
     Declaration,
     Source,
@@ -49,6 +50,8 @@ from gripbench.bench.running.isolation.confinement import (
     end_with,
     part_from_parent,
 )
+from gripbench.bench.running.isolation.fits import fit_answer
+from gripbench.bench.running.isolation.lines import ServedLine
 from gripbench.bench.running.isolation.messages import (
     END,
     ESTIMATES,
@@ -66,37 +69,6 @@ from gripbench.methods.contract import CompiledMethod
 from gripbench.sources import source_files
 
 
-class _Line:
-    """Two file descriptors, in and out; the other side's end ends this process."""
-
-    def __init__(self, read: int, write: int) -> None:
-        self.read, self.write = read, write
-
-    def receive(self, size: int) -> bytes:
-        content = os.read(self.read, size)
-        while len(content) < size:
-            more = os.read(self.read, size - len(content))
-            if not more:
-                os._exit(0)
-            content += more
-        return content
-
-    def message(self) -> dict[str, Any]:
-        return read_message(self.receive)
-
-    def send(self, content: dict[str, Any]) -> None:
-        self.put(message_bytes(content))
-
-    def put(self, content: bytes) -> None:
-        view = memoryview(content)
-        while view:
-            view = view[os.write(self.write, view) :]
-
-    def close(self) -> None:
-        for descriptor in {self.read, self.write}:
-            os.close(descriptor)
-
-
 def serve(forks: bool) -> NoReturn:
     """Answer the run that started this interpreter, over standard input and output."""
     read, write = os.dup(0), os.dup(0 if forks else 1)
@@ -107,7 +79,7 @@ def serve(forks: bool) -> NoReturn:
     Simulation.__new__ = _refuse  # type: ignore[method-assign]
     if forks:
         _start_plugins(socket.socket(fileno=read))
-    line = _Line(read, write)
+    line = ServedLine(read, write)
     line.send({"process": os.getpid()})
     _serve_plugin(line, forks=False)
 
@@ -122,7 +94,7 @@ def _start_plugins(control: socket.socket) -> NoReturn:
     gc.collect()
     gc.freeze()
     plugins: set[int] = set()
-    _Line(control.fileno(), control.fileno()).send({"process": os.getpid()})
+    ServedLine(control.fileno(), control.fileno()).send({"process": os.getpid()})
     while True:
         content, descriptors, _, _ = socket.recv_fds(control, 65536, 1)
         if not content:
@@ -133,7 +105,7 @@ def _start_plugins(control: socket.socket) -> NoReturn:
             process = os.fork()
             if process == 0:
                 control.close()
-                _serve_plugin(_Line(descriptors[0], descriptors[0]), forks=True)
+                _serve_plugin(ServedLine(descriptors[0], descriptors[0]), forks=True)
             os.close(descriptors[0])
             plugins.add(process)
             control.sendall(message_bytes({"process": process}))
@@ -183,12 +155,13 @@ class _Plugin:
     declaration: Declaration
     batch: bool
     expected: dict[str, str]
+    state: bytes
 
     def make(self) -> Any:
-        return self.source.make(self.variant, self.parameters)
+        return given_state(self.source.make(self.variant, self.parameters), self.state)
 
 
-def _serve_plugin(line: _Line, forks: bool) -> NoReturn:
+def _serve_plugin(line: ServedLine, forks: bool) -> NoReturn:
     """Load one plug-in, then serve its cells."""
     if forks:
         end_with(os.getppid())
@@ -197,7 +170,7 @@ def _serve_plugin(line: _Line, forks: bool) -> NoReturn:
     audit.install()
     before = _shared_by_forks()
     try:
-        plugin = _load(request)
+        plugin = _load(request, line.receive(request["state"]))
     except MemoryError:
         line.send({"status": "out of memory", "reason": ""})
     except BaseException as error:  # SystemExit too
@@ -243,7 +216,7 @@ def _shared_by_forks() -> set[str]:
     return found | {str(place) for place, rights in mapped if rights.startswith(b"rw-s")}
 
 
-def _load(request: dict[str, Any]) -> _Plugin:
+def _load(request: dict[str, Any], state: bytes) -> _Plugin:
     _seed(request["seed"])
     if request["folder"]:
         os.chdir(request["folder"])
@@ -261,7 +234,7 @@ def _load(request: dict[str, Any]) -> _Plugin:
         str(check): str(reason)
         for check, reason in dict(getattr(method, "expected_failures", {})).items()
     }
-    return _Plugin(source, variant, parameters, declaration, has_batch(method), expected)
+    return _Plugin(source, variant, parameters, declaration, has_batch(method), expected, state)
 
 
 def _check_bounds() -> None:
@@ -295,7 +268,7 @@ def _compile(method: Any) -> None:
             drivers.compile_single(method)
 
 
-def _fork_cells(line: _Line, plugin: _Plugin) -> NoReturn:
+def _fork_cells(line: ServedLine, plugin: _Plugin) -> NoReturn:
     control = socket.socket(fileno=line.read)
     while True:
         content, descriptors, _, _ = socket.recv_fds(control, 1 << 20, 2)
@@ -308,7 +281,7 @@ def _fork_cells(line: _Line, plugin: _Plugin) -> NoReturn:
             control.close()
             end_with(parent)
             part_from_parent()
-            _serve_request(_Line(*descriptors), plugin, request)
+            _serve_request(ServedLine(*descriptors), plugin, request)
         for descriptor in descriptors:
             os.close(descriptor)
         _, status = os.waitpid(process, 0)
@@ -316,13 +289,15 @@ def _fork_cells(line: _Line, plugin: _Plugin) -> NoReturn:
         line.send({"ended": os.waitstatus_to_exitcode(status)})
 
 
-def _serve_request(line: _Line, plugin: _Plugin, request: dict[str, Any]) -> NoReturn:
+def _serve_request(line: ServedLine, plugin: _Plugin, request: dict[str, Any]) -> NoReturn:
     if "trial" in request:
         _serve_trial(line, plugin, request)
+    if "fit" in request:
+        _serve_fit(line, plugin, request)
     _serve_cell(line, plugin, request)
 
 
-def _serve_trial(line: _Line, plugin: _Plugin, request: dict[str, Any]) -> NoReturn:
+def _serve_trial(line: ServedLine, plugin: _Plugin, request: dict[str, Any]) -> NoReturn:
     """Try the method over samples that come all at once: not to be scored."""
     try:
         _seed(request["seed"])
@@ -342,7 +317,17 @@ def _serve_trial(line: _Line, plugin: _Plugin, request: dict[str, Any]) -> NoRet
     os._exit(0)
 
 
-def _serve_cell(line: _Line, plugin: _Plugin, request: dict[str, Any]) -> NoReturn:
+def _serve_fit(line: ServedLine, plugin: _Plugin, request: dict[str, Any]) -> NoReturn:
+    """Have the method fitted on the drives that come."""
+    try:
+        _seed(request["seed"])
+        line.put(fit_answer(plugin.make, request["fit"], line.receive, audit.report))
+    except BaseException as error:
+        line.put(message_bytes(_failure(error)))
+    os._exit(0)
+
+
+def _serve_cell(line: ServedLine, plugin: _Plugin, request: dict[str, Any]) -> NoReturn:
     """Run the method over the samples that come, one by one."""
     try:
         _seed(request["seed"])
@@ -357,7 +342,7 @@ def _serve_cell(line: _Line, plugin: _Plugin, request: dict[str, Any]) -> NoRetu
     os._exit(0)
 
 
-def _samples(line: _Line, method: Any, declaration: Declaration) -> None:
+def _samples(line: ServedLine, method: Any, declaration: Declaration) -> None:
     names = (*declaration.sensors, "time")
     outputs = declaration.outputs
     request = struct.Struct(f"=QQ{len(names)}d")

@@ -89,6 +89,7 @@ class Sandbox:
         vehicle: Mapping[str, float],
         observations: npt.NDArray[Any],
         period: float,
+        state: bytes = b"",
     ) -> Outcome:
         """Run a method over a recording.
 
@@ -104,13 +105,15 @@ class Sandbox:
             Structured array, shape (n,), with at least the declared channels and `time`.
         period
             Nominal time [s] between samples.
+        state
+            What its `fit` returned, packed.
 
         Raises
         ------
         CellFailure
             With status `failed`, `timeout` or `skipped` and the reason.
         """
-        found = self.load(Settings(source, variant, parameters)).declaration
+        found = self.load(Settings(source, variant, parameters, state)).declaration
         if (found.sensors, found.outputs) != (declaration.sensors, declaration.outputs):
             raise CellFailure("failed", "it declares other sensors or estimates than before")
         selected = select_channels(observations, found.sensors)
@@ -139,7 +142,7 @@ class Sandbox:
         self._process = process = start_plugin(self.limits.sandbox, message["folder"])
         line, limit = process.line, max(self.limits.time, LOADING)
         deadline = time.monotonic() + limit
-        answer = self._answer(line, deadline, limit, message)
+        answer = self._answer(line, deadline, limit, message, settings.state)
         try:
             loaded = Loaded(
                 declaration_from(answer["declaration"]),
@@ -305,12 +308,18 @@ class Sandbox:
             raise CellFailure("failed", "more answers came than it was given samples")
 
     def _answer(
-        self, line: Line, deadline: float, limit: float, content: dict[str, Any] | None = None
+        self,
+        line: Line,
+        deadline: float,
+        limit: float,
+        content: dict[str, Any] | None = None,
+        behind: bytes = b"",
     ) -> dict[str, Any]:
-        """Return the answer to a message; raise what it says has gone wrong."""
+        """Return the answer to a message and what follows it; raise what it says went wrong."""
         try:
             if content is not None:
                 line.send(content, deadline)
+                line.put(behind, deadline)
             answer = read_message(lambda length: line.receive(length, deadline))
         except (LateError, EOFError, OSError) as error:
             self._lost(error, limit)
