@@ -1,6 +1,7 @@
 """Networks in ONNX files and FMUs: the numbers of a twin in Python, the same checks, their keys."""
 
 import inspect
+import runpy
 import shutil
 import subprocess
 import zipfile
@@ -22,12 +23,13 @@ pytest.importorskip("onnxruntime", reason="needs the package onnxruntime")
 fmpy = pytest.importorskip("fmpy", reason="needs the package fmpy")
 
 PLUGINS = Path(__file__).parent / "plugins"
+EXAMPLES = Path(__file__).parents[2] / "examples"
 needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
 
 DECLARED = """
-from gripbench import Fmu, OnnxModel, Parameter
+from gripbench import Fmu, Parameter
 
-class {kind}Method({kind}):
+class Unit(Fmu):
     name = "smoothed_{name}"
     {file}
     sensors = ("accel_x",)
@@ -53,42 +55,19 @@ class Twin:
 """
 
 
-def network(path, scale=0.5, state="smooth", external="", kind=None):
+def network(path, external="", **changes):
     """Write the low-pass as a network: a state, its next value, the force."""
-    from onnx import TensorProto, helper, numpy_helper
-
-    kind = kind or TensorProto.DOUBLE
-    dtype = helper.tensor_dtype_to_np_dtype(kind)
-    half = numpy_helper.from_array(np.full((1, 1), scale, dtype), "half")
-
-    def tensor(name):
-        return helper.make_tensor_value_info(name, kind, [1, 1])
-
-    nodes = [
-        helper.make_node("Add", ["settings", "elapsed"], ["both"]),
-        helper.make_node("Div", ["elapsed", "both"], ["share"]),
-        helper.make_node("Sub", ["sample", state], ["difference"]),
-        helper.make_node("Mul", ["share", "difference"], ["change"]),
-        helper.make_node("Add", [state, "change"], ["next"]),
-        helper.make_node("Mul", ["half", "vehicle"], ["mass"]),
-        helper.make_node("Mul", ["mass", "next"], ["estimates"]),
-    ]
-    given = [tensor(name) for name in ("sample", "elapsed", "vehicle", "settings", state)]
-    graph = helper.make_graph(
-        nodes, "low_pass", given, [tensor("estimates"), tensor("next")], [half]
-    )
-    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=9)
+    low_pass = runpy.run_path(str(EXAMPLES / "onnx" / "make_network.py"))["low_pass"]
+    model = low_pass(**changes)
     onnx.checker.check_model(model)
     outside = {"save_as_external_data": True, "location": external, "size_threshold": 0}
     onnx.save(model, path, **(outside if external else {}))
 
 
-def onnx_method(folder, **settings):
-    network(folder / "net.onnx", **settings)
-    source = folder / "onnx_method.py"
-    file = 'model = "net.onnx"; states = {"smooth": "next"}'
-    source.write_text(DECLARED.format(kind="OnnxModel", name="onnx", file=file))
-    return source
+def onnx_method(folder, **changes):
+    network(folder / "smoothed_force.onnx", **changes)
+    shutil.copy(EXAMPLES / "onnx" / "smoothed_force_onnx.py", folder)
+    return folder / "smoothed_force_onnx.py"
 
 
 DESCRIPTION_2 = """<?xml version="1.0" encoding="UTF-8"?>
@@ -142,7 +121,7 @@ def fmu_method(folder, version, change=("", ""), accel="accel_x"):
         archive.write(library, f"binaries/{place}/smoothed_force.so")
     source = folder / f"fmu{version}.py"
     file = f'fmu = "unit{version}.fmu"; variables = {{"accel_x": "{accel}"}}'
-    source.write_text(DECLARED.format(kind="Fmu", name=f"fmu{version}", file=file))
+    source.write_text(DECLARED.format(name=f"fmu{version}", file=file))
     return source
 
 
@@ -188,7 +167,7 @@ def test_they_rank_beside_built_in_ones_and_run_again_when_their_files_change(
         return frame[frame["target"] == "force_x_front"].set_index("label")
 
     first = run()
-    names = ["smoothed_onnx", "smoothed_fmu2", "smoothed_fmu3"]
+    names = ["smoothed_force_onnx", "smoothed_fmu2", "smoothed_fmu3"]
     assert dict(first.loc[names, "status"]) == dict.fromkeys(names, "ok")
     np.testing.assert_allclose(first.loc[names, "rms"], first.loc[names[0], "rms"], rtol=1e-12)
     board = gripbench.rank(gripbench.read_rows(results), target="force_x_front", sensors="any")
@@ -198,13 +177,13 @@ def test_they_rank_beside_built_in_ones_and_run_again_when_their_files_change(
         assert not rows[name].untracked
         assert not any("/gripbench_fmu" in key for key in rows[name].dependencies)
     assert (run()["key"] == first["key"]).all()
-    network(units / "net.onnx", scale=0.6)
+    network(units / "smoothed_force.onnx", share_of_mass=0.6)
     for version in (2, 3):
         fmu_method(units, version, change=("0.5 * u->value[1]", "0.6 * u->value[1]"))
     second = run()
     assert (second.loc[names, "key"] != first.loc[names, "key"]).all()
     assert (second.loc[names, "rms"] != first.loc[names, "rms"]).all()
-    for path, file in zip(paths, ("net.onnx", "unit2.fmu", "unit3.fmu"), strict=True):
+    for path, file in zip(paths, ("smoothed_force.onnx", "unit2.fmu", "unit3.fmu"), strict=True):
         (units / file).unlink()
         with pytest.raises(InputError, match=file):
             choose_method(str(path))
@@ -213,7 +192,7 @@ def test_they_rank_beside_built_in_ones_and_run_again_when_their_files_change(
 def test_weights_beside_a_network_are_part_of_the_key(tmp_path):
     source = onnx_method(tmp_path, external="net.weights")
     first = choose_method(str(source))
-    assert first.declaration.files == ("net.onnx", "net.weights")
+    assert first.declaration.files == ("smoothed_force.onnx", "net.weights")
     weights = tmp_path / "net.weights"
     weights.write_bytes(np.full(1, 0.7).tobytes())
     assert choose_method(str(source)).digest != first.digest
@@ -239,11 +218,14 @@ def test_a_network_that_does_not_fit_says_where(tmp_path, change, words):
 @pytest.mark.parametrize("content", [b"", b"no network", b"\x08\x09"])
 def test_what_is_no_network_or_unit_is_one_line(units, content):
     source = onnx_method(units)
-    (units / "net.onnx").write_bytes(content)
+    (units / "smoothed_force.onnx").write_bytes(content)
     (units / "unit2.fmu").write_bytes(content)
     fmu = units / "fmu2.py"
-    fmu.write_text(DECLARED.format(kind="Fmu", name="fmu2", file='fmu = "unit2.fmu"'))
-    for path, words in ((source, r"net\.onnx: cannot be used"), (fmu, r"unit2\.fmu: cannot be")):
+    fmu.write_text(DECLARED.format(name="fmu2", file='fmu = "unit2.fmu"'))
+    for path, words in (
+        (source, r"smoothed_force\.onnx: cannot be used"),
+        (fmu, r"unit2\.fmu: cannot be"),
+    ):
         with pytest.raises(InputError, match=words) as error:
             choose_method(str(path))
         assert "\n" not in str(error.value)

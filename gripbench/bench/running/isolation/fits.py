@@ -17,7 +17,7 @@ from gripbench.bench.running.isolation.loading import Settings, named_seed, read
 from gripbench.bench.running.isolation.messages import message_bytes, read_message
 from gripbench.bench.running.isolation.sandbox import LOADING, Sandbox
 from gripbench.bench.running.isolation.training_drives import TrainingDrive, received
-from gripbench.errors import GripbenchError
+from gripbench.errors import GripbenchError, InputError
 
 
 class FittingSandbox(Sandbox):
@@ -64,7 +64,7 @@ class FittingSandbox(Sandbox):
                 raise ValueError("no state")
             content = line.receive(size, began + limit + LOADING)
             return packed(numbers_of_fit(unpacked(content))), took, read_by(answer)
-        except CellFailure:
+        except (CellFailure, InputError):  # of the method, or of who makes the drives
             raise
         except (LateError, EOFError, OSError) as error:
             self._lost(error, limit)
