@@ -25,6 +25,12 @@ from gripbench.extensions import entry_points, load
 VARIANCE = "_variance"
 """Suffix of the estimate that holds the variance of another estimate."""
 
+QUANTILE = "_q"
+"""Before the digits of a level: the estimate that holds that quantile of another, as `mu_q05`."""
+
+INNOVATION = "_innovation"
+"""Suffix of the field that holds a channel's last reading less its prediction."""
+
 NEW = "_new"
 """Suffix of the flag that is 1 when a held channel carries a new sample, else 0."""
 
@@ -221,14 +227,6 @@ _BODY = (
     Signal(
         "cornering_stiffness_rear", "N/rad", "wheel", "-", "", "Cornering stiffness, rear axle"
     ),
-    Signal(
-        "course_innovation", "rad", "earth", "from north to west", "",
-        "Last course reading less its prediction",
-    ),
-    Signal(
-        "yaw_rate_innovation", "rad/s", "vehicle", "turning left", "",
-        "Last yaw rate reading less its prediction",
-    ),
     Signal("mu_used", "-", "-", "-", "", "Used friction, mean of the four wheels"),
 )  # fmt: skip
 
@@ -275,7 +273,7 @@ SIGNALS: dict[str, Signal] = {
 
 
 def signal(name: str) -> Signal:
-    """Return a signal by name; variance and `_new` channels derive from their parent.
+    """Return a signal by name; those of a variance, quantile, innovation, flag derive from it.
 
     Raises
     ------
@@ -284,19 +282,36 @@ def signal(name: str) -> Signal:
     """
     if name in SIGNALS:
         return SIGNALS[name]
-    if name.endswith(VARIANCE) and name.removesuffix(VARIANCE) in SIGNALS:
-        parent = SIGNALS[name.removesuffix(VARIANCE)]
-        unit = "-" if parent.unit == "-" else f"({parent.unit})^2"
-        return Signal(name, unit, parent.frame, "-", "", f"Variance of {parent.name}")
-    if name.endswith(NEW) and name.removesuffix(NEW) in SIGNALS:
-        parent = SIGNALS[name.removesuffix(NEW)]
-        return Signal(
-            name, "-", "-", "1: new sample, 0: held", parent.instrument, f"{parent.name} is new"
-        )
+    derived = _derived(name)
+    if derived is not None:
+        return derived
     known = len(SIGNALS)
     if len(all_signals()) > known:
         return signal(name)
     raise unknown("signal", name, SIGNALS)
+
+
+def _derived(name: str) -> Signal | None:
+    """Return a signal that says something of another one, None where there is no such other."""
+    if name.endswith(NEW) and name.removesuffix(NEW) in SIGNALS:
+        parent = SIGNALS[name.removesuffix(NEW)]
+        sign, text = "1: new sample, 0: held", f"{parent.name} is new"
+        return Signal(name, "-", "-", sign, parent.instrument, text)
+    plain = name.removesuffix(VARIANCE)
+    stem, _, level = plain.rpartition(QUANTILE)
+    found = SIGNALS.get(plain)
+    if plain.removesuffix(INNOVATION) in SIGNALS and plain.endswith(INNOVATION):
+        parent = SIGNALS[plain.removesuffix(INNOVATION)]
+        text = f"Last reading of {parent.name} less its prediction"
+        found = Signal(plain, parent.unit, parent.frame, parent.sign, "", text)
+    elif stem in SIGNALS and level.isdecimal() and len(level) > 1 and plain == name:
+        parent = SIGNALS[stem]
+        text = f"Quantile of {parent.name}, level .{level}"
+        return Signal(name, parent.unit, parent.frame, parent.sign, "", text)
+    if found is None or plain == name:
+        return found
+    unit = "-" if found.unit == "-" else f"({found.unit})^2"
+    return Signal(name, unit, found.frame, "-", "", f"Variance of {plain}")
 
 
 def all_signals() -> dict[str, Signal]:

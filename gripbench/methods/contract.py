@@ -30,10 +30,11 @@ import numpy as np
 import numpy.typing as npt
 
 from gripbench.compilation import compiled, replacing
-from gripbench.envs.signals import VARIANCE, record_type, signal
+from gripbench.envs.signals import record_type, signal
 from gripbench.envs.vehicles import require
 from gripbench.errors import InputError, UndeclaredChannelError, unknown
 from gripbench.methods import drivers
+from gripbench.methods.outputs import checked_quantiles, fields_of
 from gripbench.methods.settings import Parameter, Setting, Variant, Variants, checked_settings
 
 
@@ -81,6 +82,11 @@ class CompiledMethod:
         Signals that it writes.
     variances
         Those of `estimates` for which it also writes `<name>_variance`.
+    quantiles
+        Levels by estimate, for those of which it writes quantiles instead (see
+        `gripbench.methods.outputs`): `{"mu": (0.05, 0.5, 0.95)}`, in `est.mu_q05` and so on.
+    innovations
+        Channels whose innovation it shows: it writes `<channel>_innovation` and its variance.
     vehicle_parameters
         Vehicle parameters that it reads.
     unread
@@ -111,6 +117,8 @@ class CompiledMethod:
     sensors: tuple[str, ...]
     estimates: ClassVar[tuple[str, ...]]
     variances: ClassVar[tuple[str, ...]] = ()
+    quantiles: ClassVar[Mapping[str, tuple[float, ...]]] = {}
+    innovations: ClassVar[tuple[str, ...]] = ()
     vehicle_parameters: tuple[str, ...] = ()
     unread: ClassVar[Callable[[Mapping[str, Setting]], Collection[str]] | None] = None
     parameters: ClassVar[tuple[Parameter, ...]] = ()
@@ -201,8 +209,8 @@ class CompiledMethod:
 
     @property
     def outputs(self) -> tuple[str, ...]:
-        """Fields that a step writes: the estimates, then their variances."""
-        return (*self.estimates, *(name + VARIANCE for name in self.variances))
+        """Fields that a step writes: estimates, variances, quantiles, innovations."""
+        return fields_of(self.estimates, self.variances, self.quantiles, self.innovations)
 
     def _fresh(self, vehicle: Mapping[str, float], length: int) -> drivers.Records:
         params = np.full(1, np.nan, self.record_types.params)
@@ -241,6 +249,7 @@ def _files_of(method: type[CompiledMethod], variant: Variant) -> set[str]:
 def _record_types(method: CompiledMethod) -> RecordTypes:
     for name in (*method.sensors, *method.estimates):
         signal(name)
+    checked_quantiles(method.name, method.quantiles, method.estimates, method.variances)
     own = tuple(parameter.name for parameter in method.parameters)
     clash = set(own) & set(method.vehicle_parameters)
     if clash:

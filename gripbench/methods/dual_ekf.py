@@ -27,6 +27,7 @@ from gripbench.methods.blocks.single_track_filter import (
     GPS_SENSORS,
     INPUT_STATE,
     LATERAL_ESTIMATES,
+    LATERAL_INNOVATIONS,
     LATERAL_VARIANCES,
     MEASURED_SENSORS,
     read_fused,
@@ -34,7 +35,9 @@ from gripbench.methods.blocks.single_track_filter import (
     read_measured,
     start_adaptive,
     write_friction,
+    write_innovations,
     write_lateral,
+    write_no_innovations,
 )
 from gripbench.methods.contract import CompiledMethod, Variant, compiled
 
@@ -53,6 +56,7 @@ def _advance(state, obs, params, est):
     filter, parameter, inputs = state.filter, state.parameter, state.inputs
     x, P, y, h = filter.x, filter.P, parameter.x, parameter.h
     span = obs.elapsed
+    write_no_innovations(est)
     if obs.first:
         P[0, 0], P[1, 1], x[1] = params.speed_y_std**2, 1.0, obs.yaw_rate
         start_adaptive(y, parameter.P, 0, params)
@@ -63,10 +67,11 @@ def _advance(state, obs, params, est):
         parameter.P[1, 1] += params.stiffness_walk**2 * span
         parameter.P[2, 2] += params.friction_walk**2 * span
         predict_track(filter, span, inputs.speed, inputs.steer, 0.0, params, state.motion)
-        correct_track(
+        rate, accel = correct_track(
             filter, span, inputs.speed, inputs.steer, 0.0, obs.yaw_rate, obs.accel_y, params,
             state.motion,
         )  # fmt: skip
+        write_innovations(rate, accel, est)
         out = state.motion
         evaluate_track(x, inputs.speed, inputs.steer, 0.0, params, out)
         h[0], h[1], h[2] = out[0, 4], out[0, 5], out[0, 3]
@@ -107,6 +112,7 @@ class DualEkf(CompiledMethod):
     sensors = FUSED_SENSORS
     estimates = (*LATERAL_ESTIMATES, "mu")
     variances = (*LATERAL_VARIANCES, "mu")
+    innovations = LATERAL_INNOVATIONS
     vehicle_parameters = FUSED_VEHICLE
     parameters = ADAPTIVE_PARAMETERS
     variants = {

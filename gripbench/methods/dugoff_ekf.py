@@ -32,7 +32,12 @@ import numpy as np
 
 from gripbench.envs.vehicles import GRAVITY
 from gripbench.methods.blocks.dugoff_tyre import dugoff_force, dugoff_slips
-from gripbench.methods.blocks.kalman import correct_scalar, filter_type, predict_covariance
+from gripbench.methods.blocks.kalman import (
+    correct_scalar,
+    filter_type,
+    innovation_variance,
+    predict_covariance,
+)
 from gripbench.methods.contract import CompiledMethod, Parameter, compiled
 
 DUGOFF_STATE = np.dtype(
@@ -181,15 +186,21 @@ def _predict(state, obs, params):
 
 
 @compiled
-def _correct(state, obs, params):
+def _correct(state, obs, params, est):
     # Noise densities: a reading that is held over several samples counts as one.
     filter = state.filter
     x, h = filter.x, filter.h
     elapsed = max(obs.time - state.time, 1e-6)
     h[0], h[1], h[2] = 1.0, 0.0, 0.0
-    correct_scalar(filter, obs.speed_x - x[0], params.speed_x_noise**2 / elapsed)
+    noise = params.speed_x_noise**2 / elapsed
+    est.speed_x_innovation = obs.speed_x - x[0]
+    est.speed_x_innovation_variance = innovation_variance(filter, noise)
+    correct_scalar(filter, obs.speed_x - x[0], noise)
     h[0], h[1], h[2] = 0.0, 0.0, 1.0
-    correct_scalar(filter, obs.yaw_rate - x[2], params.yaw_rate_noise**2 / elapsed)
+    noise = params.yaw_rate_noise**2 / elapsed
+    est.yaw_rate_innovation = obs.yaw_rate - x[2]
+    est.yaw_rate_innovation_variance = innovation_variance(filter, noise)
+    correct_scalar(filter, obs.yaw_rate - x[2], noise)
 
 
 @compiled
@@ -204,6 +215,8 @@ def _used(wheels, i):
 def _step(state, obs, params, est):
     filter = state.filter
     x, P, wheels = filter.x, filter.P, state.wheels
+    est.speed_x_innovation, est.speed_x_innovation_variance = 0.0, 0.0
+    est.yaw_rate_innovation, est.yaw_rate_innovation_variance = 0.0, 0.0
     if state.samples == 0.0:
         x[0], x[2] = obs.speed_x, obs.yaw_rate
         P[0, 0] = params.speed_x_noise**2 / _FIRST_SAMPLE
@@ -212,7 +225,7 @@ def _step(state, obs, params, est):
     else:
         _predict(state, obs, params)
         if params.correction > 0.0:
-            _correct(state, obs, params)
+            _correct(state, obs, params, est)
     state.samples += 1.0
     state.time = obs.time
     _read_inputs(state, obs, params, 1.0)
@@ -273,6 +286,7 @@ class DugoffEkf(CompiledMethod):
         "mu_used",
     )
     variances = ("sideslip", "speed_x", "speed_y", "yaw_rate")
+    innovations = ("speed_x", "yaw_rate")
     vehicle_parameters = (
         "mass",
         "yaw_inertia",

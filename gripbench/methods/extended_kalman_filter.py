@@ -34,7 +34,12 @@ from gripbench.methods.blocks.axle_friction import (
     start_friction,
     unread_tyre,
 )
-from gripbench.methods.blocks.kalman import correct_scalar, filter_type, predict
+from gripbench.methods.blocks.kalman import (
+    correct_scalar,
+    filter_type,
+    innovation_variance,
+    predict,
+)
 from gripbench.methods.contract import CompiledMethod, Parameter, Variant, compiled
 
 SPEED, WHEEL_FRONT, WHEEL_REAR, FORCE_FRONT, FORCE_REAR = 0, 1, 2, 3, 4
@@ -80,14 +85,22 @@ def advance(kalman, torque_front, torque_rear, elapsed, params):
 
 
 @compiled
-def measure(kalman, accel_x, wheel_front, wheel_rear, speed, params):
+def measure(kalman, accel_x, wheel_front, wheel_rear, speed, params, est):
     """Take a_x, w_f and w_r one after the other (their noises are independent), eq. 20."""
     h, x = kalman.h, kalman.x
     for i in range(5):
         h[i] = 0.0
     h[WHEEL_FRONT] = 1.0
+    est.wheel_speed_front_innovation = wheel_front - x[WHEEL_FRONT]
+    est.wheel_speed_front_innovation_variance = innovation_variance(
+        kalman, params.wheel_speed_variance
+    )
     correct_scalar(kalman, wheel_front - x[WHEEL_FRONT], params.wheel_speed_variance)
     h[WHEEL_FRONT], h[WHEEL_REAR] = 0.0, 1.0
+    est.wheel_speed_rear_innovation = wheel_rear - x[WHEEL_REAR]
+    est.wheel_speed_rear_innovation_variance = innovation_variance(
+        kalman, params.wheel_speed_variance
+    )
     correct_scalar(kalman, wheel_rear - x[WHEEL_REAR], params.wheel_speed_variance)
     h[WHEEL_REAR] = 0.0
     h[FORCE_FRONT] = 1.0 / params.mass
@@ -97,6 +110,8 @@ def measure(kalman, accel_x, wheel_front, wheel_rear, speed, params):
         resistance = params.rolling_resistance * GRAVITY
         resistance += params.drag * speed * speed / params.mass
     expected = (x[FORCE_FRONT] + x[FORCE_REAR]) / params.mass - resistance
+    est.accel_x_innovation = accel_x - expected
+    est.accel_x_innovation_variance = innovation_variance(kalman, params.acceleration_variance)
     correct_scalar(kalman, accel_x - expected, params.acceleration_variance)
 
 
@@ -123,7 +138,9 @@ def _step(state, obs, accel_x, params, est):
         kalman.x[WHEEL_REAR] = obs.wheel_speed_rear
     else:
         advance(kalman, obs.torque_front, obs.torque_rear, elapsed, params)
-    measure(kalman, accel_x, obs.wheel_speed_front, obs.wheel_speed_rear, obs.speed_gps, params)
+    measure(
+        kalman, accel_x, obs.wheel_speed_front, obs.wheel_speed_rear, obs.speed_gps, params, est
+    )
     _finish(state, obs, elapsed, params, est)
 
 
@@ -160,6 +177,7 @@ class ExtendedKalmanFilter(CompiledMethod):
     )
     estimates = ("force_x_front", "force_x_rear", "mu_front", "mu_rear")
     variances = ("force_x_front", "force_x_rear")
+    innovations = ("wheel_speed_front", "wheel_speed_rear", "accel_x")
     vehicle_parameters = (
         *AXLE_FRICTION_VEHICLE,
         *RESISTANCE_PARAMETERS,

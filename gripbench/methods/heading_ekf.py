@@ -365,7 +365,16 @@ def wrapped(angle):
 @compiled
 def _step(state, obs, params, est):
     heading = state.heading
+    before = heading.taken
     heading_step(heading, obs, params)
+    taken = 1.0 if heading.taken > before else 0.0
+    residual, spread = heading.filter.residual, heading.filter.S
+    est.magnetic_field_x_innovation = taken * residual[0]
+    est.magnetic_field_y_innovation = taken * residual[1]
+    est.magnetic_field_z_innovation = taken * residual[2]
+    est.magnetic_field_x_innovation_variance = taken * spread[0, 0]
+    est.magnetic_field_y_innovation_variance = taken * spread[1, 1]
+    est.magnetic_field_z_innovation_variance = taken * spread[2, 2]
     est.yaw = wrapped(heading.filter.x[0])
     est.roll = heading.filter.x[1]
     est.yaw_variance = heading.filter.P[0, 0]
@@ -381,6 +390,7 @@ class HeadingEkf(CompiledMethod):
     sensors = HEADING_SENSORS
     estimates = ("yaw", "roll")
     variances = ("yaw", "roll")
+    innovations = ("magnetic_field_x", "magnetic_field_y", "magnetic_field_z")
     vehicle_parameters = HEADING_VEHICLE
     unread = staticmethod(unread_heading)
     parameters = HEADING_PARAMETERS

@@ -68,11 +68,11 @@ def _advance(state, obs, params, est):
             predict_track(
                 filter, span, inputs.speed, inputs.steer, FRICTION[j], params, state.motion
             )
-            rate, rate_spread, accel, accel_spread = correct_track(
+            rate, accel = correct_track(
                 filter, span, inputs.speed, inputs.steer, FRICTION[j], obs.yaw_rate, obs.accel_y,
                 params, state.motion,
             )  # fmt: skip
-            bank.score[j] = score_of(rate, rate_spread) + score_of(accel, accel_spread)
+            bank.score[j] = score_of(rate[0], rate[1]) + score_of(accel[0], accel[1])
             put(bank, j, filter)
         weigh(bank)
     speed_y, variance = moments(bank, 0)

@@ -20,6 +20,7 @@ from gripbench.methods.blocks.single_track_filter import (
     GPS_SENSORS,
     INPUT_STATE,
     LATERAL_ESTIMATES,
+    LATERAL_INNOVATIONS,
     LATERAL_VARIANCES,
     MEASURED_SENSORS,
     read_fused,
@@ -27,7 +28,9 @@ from gripbench.methods.blocks.single_track_filter import (
     read_measured,
     start_adaptive,
     write_friction,
+    write_innovations,
     write_lateral,
+    write_no_innovations,
 )
 from gripbench.methods.contract import CompiledMethod, Variant, compiled
 
@@ -41,6 +44,7 @@ def _advance(state, obs, params, est):
     filter, inputs = state.filter, state.inputs
     x, P, Q = filter.x, filter.P, filter.Q
     span = obs.elapsed
+    write_no_innovations(est)
     if obs.first:
         P[0, 0], P[1, 1], x[1] = params.speed_y_std**2, 1.0, obs.yaw_rate
         start_adaptive(x, P, 2, params)
@@ -48,10 +52,11 @@ def _advance(state, obs, params, est):
         Q[2, 2] = Q[3, 3] = params.stiffness_walk**2 * span
         Q[4, 4] = params.friction_walk**2 * span
         predict_track(filter, span, inputs.speed, inputs.steer, 0.0, params, state.motion)
-        correct_track(
+        rate, accel = correct_track(
             filter, span, inputs.speed, inputs.steer, 0.0, obs.yaw_rate, obs.accel_y, params,
             state.motion,
         )  # fmt: skip
+        write_innovations(rate, accel, est)
     write_lateral(inputs, x[0], x[1], P[0, 0], est)
     write_friction(x[4], P[4, 4], est)
 
@@ -83,6 +88,7 @@ class JointEkf(CompiledMethod):
     sensors = FUSED_SENSORS
     estimates = (*LATERAL_ESTIMATES, "mu")
     variances = (*LATERAL_VARIANCES, "mu")
+    innovations = LATERAL_INNOVATIONS
     vehicle_parameters = FUSED_VEHICLE
     parameters = ADAPTIVE_PARAMETERS
     variants = {

@@ -28,7 +28,12 @@ from gripbench.methods.blocks.course_history import (
     remember,
     wrapped,
 )
-from gripbench.methods.blocks.kalman import correct_scalar, filter_type, predict_covariance
+from gripbench.methods.blocks.kalman import (
+    correct_scalar,
+    filter_type,
+    innovation_variance,
+    predict_covariance,
+)
 from gripbench.methods.contract import CompiledMethod, Parameter, compiled
 
 KINEMATIC_STATE = np.dtype(
@@ -45,6 +50,8 @@ KINEMATIC_STATE = np.dtype(
         ("sideslip", np.float64),
         ("sideslip_variance", np.float64),
         ("speed", np.float64),
+        ("course_innovation", np.float64),
+        ("course_innovation_variance", np.float64),  # 0 where no course was taken
     ]
 )
 """State of the kinematic filter; `filter.x` is heading [rad], bias [rad/s] and scale factor."""
@@ -96,6 +103,7 @@ def advance_kinematic(state, obs, params):
     filter = state.filter
     x = filter.x
     elapsed = obs.time - state.time if state.samples > 0.0 else 0.0
+    state.course_innovation, state.course_innovation_variance = 0.0, 0.0
     if state.samples == 0.0:
         state.rate = obs.yaw_rate
     corrected = (held_rate(state.rate, obs.yaw_rate) - x[1]) / x[2]
@@ -131,7 +139,9 @@ def advance_kinematic(state, obs, params):
             filter.P[0, i] = 0.0
             filter.P[i, 0] = 0.0
     elif obs.time >= state.turn_until:
-        correct_scalar(filter, wrapped(obs.course - (x[0] - turned)), variance)
+        state.course_innovation = wrapped(obs.course - (x[0] - turned))
+        state.course_innovation_variance = innovation_variance(filter, variance)
+        correct_scalar(filter, state.course_innovation, variance)
     state.sideslip = wrapped(obs.course - (x[0] - turned))
     state.sideslip_variance = filter.P[0, 0] + variance
     return True
@@ -146,6 +156,8 @@ def _step(state, obs, params, est):
     est.yaw_rate = (obs.yaw_rate - filter.x[1]) / filter.x[2]
     est.gyro_bias = filter.x[1]
     est.gyro_scale = filter.x[2]
+    est.course_innovation = state.course_innovation
+    est.course_innovation_variance = state.course_innovation_variance
     est.sideslip_variance = state.sideslip_variance
     est.yaw_variance = filter.P[0, 0]
     est.gyro_bias_variance = filter.P[1, 1]
@@ -161,6 +173,7 @@ class KinematicKalmanFilter(CompiledMethod):
     sensors = KINEMATIC_SENSORS
     estimates = ("sideslip", "yaw", "yaw_rate", "gyro_bias", "gyro_scale")
     variances = ("sideslip", "yaw", "gyro_bias", "gyro_scale")
+    innovations = ("course",)
     parameters = KINEMATIC_PARAMETERS
     variants = {"scale_factor": {"gyro_scale_std": 0.02}}
     printed = "gripbench.methods.printed.anderson2004"

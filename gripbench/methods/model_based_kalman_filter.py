@@ -241,17 +241,9 @@ MODEL_BASED_ESTIMATES = (
     "gyro_bias",
     "force_y_front",
     "force_y_rear",
-    "course_innovation",
-    "yaw_rate_innovation",
 )
-MODEL_BASED_VARIANCES = (
-    "sideslip",
-    "yaw_rate",
-    "yaw",
-    "gyro_bias",
-    "course_innovation",
-    "yaw_rate_innovation",
-)
+MODEL_BASED_VARIANCES = ("sideslip", "yaw_rate", "yaw", "gyro_bias")
+MODEL_BASED_INNOVATIONS = ("course", "yaw_rate")
 
 
 @compiled
@@ -277,6 +269,7 @@ class ModelBasedKalmanFilter(CompiledMethod):
     sensors = MODEL_BASED_SENSORS
     estimates = MODEL_BASED_ESTIMATES
     variances = MODEL_BASED_VARIANCES
+    innovations = MODEL_BASED_INNOVATIONS
     vehicle_parameters = SINGLE_TRACK
     parameters = MODEL_BASED_PARAMETERS
     variants = {

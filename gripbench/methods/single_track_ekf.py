@@ -21,12 +21,15 @@ from gripbench.methods.blocks.single_track_filter import (
     GPS_SENSORS,
     INPUT_STATE,
     LATERAL_ESTIMATES,
+    LATERAL_INNOVATIONS,
     LATERAL_VARIANCES,
     MEASURED_SENSORS,
     read_fused,
     read_gps,
     read_measured,
+    write_innovations,
     write_lateral,
+    write_no_innovations,
 )
 from gripbench.methods.contract import CompiledMethod, Parameter, Variant, compiled
 
@@ -39,6 +42,7 @@ _STATE = np.dtype(
 def _advance(state, obs, params, est):
     filter, inputs = state.filter, state.inputs
     span = obs.elapsed
+    write_no_innovations(est)
     if obs.first:
         filter.P[0, 0], filter.P[1, 1] = params.speed_y_std**2, 1.0
         filter.x[1] = obs.yaw_rate
@@ -46,10 +50,11 @@ def _advance(state, obs, params, est):
         predict_track(
             filter, span, inputs.speed, inputs.steer, params.friction, params, state.motion
         )
-        correct_track(
+        rate, accel = correct_track(
             filter, span, inputs.speed, inputs.steer, params.friction, obs.yaw_rate, obs.accel_y,
             params, state.motion,
         )  # fmt: skip
+        write_innovations(rate, accel, est)
     write_lateral(inputs, filter.x[0], filter.x[1], filter.P[0, 0], est)
 
 
@@ -80,6 +85,7 @@ class SingleTrackEkf(CompiledMethod):
     sensors = FUSED_SENSORS
     estimates = LATERAL_ESTIMATES
     variances = LATERAL_VARIANCES
+    innovations = LATERAL_INNOVATIONS
     vehicle_parameters = FUSED_VEHICLE
     parameters = (
         *FUSED_PARAMETERS,

@@ -15,7 +15,12 @@ from __future__ import annotations
 import numpy as np
 
 from gripbench.methods.blocks.discretisation import exponential
-from gripbench.methods.blocks.kalman import correct_scalar, filter_type, predict_covariance
+from gripbench.methods.blocks.kalman import (
+    correct_scalar,
+    filter_type,
+    innovation_variance,
+    predict_covariance,
+)
 from gripbench.methods.blocks.single_track import SINGLE_TRACK_VEHICLE
 from gripbench.methods.blocks.single_track_filter import (
     FUSED_PARAMETERS,
@@ -24,12 +29,14 @@ from gripbench.methods.blocks.single_track_filter import (
     GPS_SENSORS,
     INPUT_STATE,
     LATERAL_ESTIMATES,
+    LATERAL_INNOVATIONS,
     LATERAL_VARIANCES,
     MEASURED_SENSORS,
     read_fused,
     read_gps,
     read_measured,
     write_lateral,
+    write_no_innovations,
 )
 from gripbench.methods.contract import CompiledMethod, Variant, compiled
 
@@ -65,6 +72,7 @@ def _advance(state, obs, params, est):
     filter, inputs = state.filter, state.inputs
     x, P, h = filter.x, filter.P, filter.h
     elapsed, speed = obs.elapsed, inputs.speed
+    write_no_innovations(est)
     if obs.first:
         P[0, 0] = params.speed_y_std**2
         P[1, 1] = 1.0
@@ -90,12 +98,18 @@ def _advance(state, obs, params, est):
         span = elapsed if elapsed > 0.0 else 0.01
         if obs.yaw_rate == obs.yaw_rate:
             h[0], h[1] = 0.0, 1.0
-            correct_scalar(filter, obs.yaw_rate - x[1], params.gyro_noise**2 / span)
+            noise = params.gyro_noise**2 / span
+            est.yaw_rate_innovation = obs.yaw_rate - x[1]
+            est.yaw_rate_innovation_variance = innovation_variance(filter, noise)
+            correct_scalar(filter, obs.yaw_rate - x[1], noise)
         if obs.accel_y == obs.accel_y:
             linear_model(state.model, speed, params)
             h[0], h[1] = state.model[0, 0], state.model[0, 1] + speed
             expected = h[0] * x[0] + h[1] * x[1] + state.model[0, 2] * inputs.steer
-            correct_scalar(filter, obs.accel_y - expected, params.accel_y_noise**2 / span)
+            noise = params.accel_y_noise**2 / span
+            est.accel_y_innovation = obs.accel_y - expected
+            est.accel_y_innovation_variance = innovation_variance(filter, noise)
+            correct_scalar(filter, obs.accel_y - expected, noise)
     write_lateral(inputs, x[0], x[1], P[0, 0], est)
 
 
@@ -126,6 +140,7 @@ class SingleTrackKalmanFilter(CompiledMethod):
     sensors = FUSED_SENSORS
     estimates = LATERAL_ESTIMATES
     variances = LATERAL_VARIANCES
+    innovations = LATERAL_INNOVATIONS
     vehicle_parameters = FUSED_VEHICLE
     parameters = FUSED_PARAMETERS
     variants = {

@@ -29,6 +29,7 @@ from gripbench.methods.kinematic_kalman_filter import (
 )
 from gripbench.methods.model_based_kalman_filter import (
     MODEL_BASED_ESTIMATES,
+    MODEL_BASED_INNOVATIONS,
     MODEL_BASED_PARAMETERS,
     MODEL_BASED_STATE,
     MODEL_BASED_VARIANCES,
@@ -145,6 +146,7 @@ class StiffnessUpdate(CompiledMethod):
         "cornering_stiffness_front",
         "cornering_stiffness_rear",
     )
+    innovations = MODEL_BASED_INNOVATIONS
     vehicle_parameters = SINGLE_TRACK
     parameters = _joined(KINEMATIC_PARAMETERS, MODEL_BASED_PARAMETERS, _OWN_PARAMETERS)
     state = STIFFNESS_UPDATE_STATE

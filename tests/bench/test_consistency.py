@@ -2,9 +2,16 @@
 
 import numpy as np
 import pytest
+from nees_coverage import LAWS, held
 from scipy import stats
 
-from gripbench.bench.scoring.consistency import chi_square_test, normalised_squares, whiteness_test
+from gripbench.bench.scoring.consistency import (
+    CONSISTENT,
+    chi_square_test,
+    normalised_squares,
+    runs_test,
+    whiteness_test,
+)
 from gripbench.errors import InputError
 
 
@@ -65,3 +72,37 @@ def test_a_mean_that_stays_is_not_white():
 def test_bad_input_is_refused(call, message):
     with pytest.raises(InputError, match=message):
         call()
+
+
+@pytest.mark.parametrize("name", ["three causes: chi-square, 3", "memory of 2000 samples in 200"])
+@pytest.mark.parametrize("runs", [3, 10])
+def test_a_consistent_filter_lies_within_the_band_of_its_runs(name, runs):
+    assert held(LAWS[name], runs, 1500) > 0.94
+
+
+@pytest.mark.parametrize(
+    ("factor", "verdict"), [(9.0, "overconfident by a factor 3"), (0.1, "cautious by a factor 3")]
+)
+def test_a_filter_whose_variance_is_off_is_told_by_how_much(factor, verdict):
+    squares = factor * LAWS["three causes: chi-square, 3"](np.random.default_rng(5), 60)
+    test = runs_test(100.0 * squares, np.full(60, 100))
+    assert test.verdict.startswith(verdict[:-1])
+    low, high = test.factor_interval
+    assert low < np.sqrt(factor) < high
+    assert test.factor == pytest.approx(np.sqrt(factor), rel=0.2)
+
+
+def test_samples_of_a_run_are_no_runs():
+    # One bias for a whole run: a thousand samples say no more than one.
+    bias = np.random.default_rng(6).normal(size=2)
+    test = runs_test(1000.0 * bias**2, [1000, 1000])
+    assert test.degrees == 2.0
+    assert test.verdict == CONSISTENT
+    same = runs_test([3.0, 3.0, 3.0, 3.0], [3] * 4)
+    assert (same.mean, same.degrees) == (1.0, 4.0)
+
+
+def test_runs_without_a_value_give_no_test():
+    assert runs_test([], []) is None
+    assert runs_test([1.0, np.nan], [1, 1]) is None
+    assert runs_test([0.0, 0.0], [5, 5]).verdict.startswith("cautious")

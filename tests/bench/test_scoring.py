@@ -95,10 +95,61 @@ def test_an_estimate_that_is_not_finite_diverges_even_where_it_does_not_count(va
         score(values, names, ("mu_front",), a_recording(np.ones(100), score_from=0.5))
 
 
-def test_a_variance_that_is_not_positive_gives_no_consistency():
-    values, names = estimates_of(np.ones(100), np.linspace(-1.0, 1.0, 100))
+def test_a_variance_that_is_zero_gives_no_consistency():
+    values, names = estimates_of(np.ones(100), np.linspace(0.0, 1.0, 100))
     found = score(values, names, ("mu_front",), a_recording(np.zeros(100)))
     assert not {"mean_nees", "crps", "sharpness", "coverage_90"} & set(found["mu_front"])
+
+
+def test_a_negative_variance_is_refused_even_where_it_does_not_count():
+    values, names = estimates_of(np.ones(100), np.where(np.arange(100) == 3, -0.5, 1.0))
+    with pytest.raises(EstimateError, match=r"mu_front_variance is -0.5 at t = 0.03 s; a variance"):
+        score(values, names, ("mu_front",), a_recording(np.zeros(100), score_from=0.5))
+
+
+def quantiles_of(*values, signal="mu_front"):
+    names = (signal, f"{signal}_q05", f"{signal}_q50", f"{signal}_q95")
+    made = np.zeros(100, record_type(names))
+    for name, value in zip(names, values, strict=True):
+        made[name] = value
+    return made, names
+
+
+def test_quantiles_are_scored_as_what_they_say():
+    truth = np.where(np.arange(100) < 80, 0.1, 3.0)
+    found = score(*quantiles_of(0.0, -1.0, 0.0, 1.0), ("mu_front",), a_recording(truth))["mu_front"]
+    assert found["coverage_90"].value == pytest.approx(0.8)
+    assert found["sharpness"].value == pytest.approx(2.0)
+    assert "coverage_95" not in found
+    deviation = 1.0 / stats.norm.ppf(0.95)
+    expected = np.mean(truth**2) / deviation**2
+    assert found["mean_nees"].value == pytest.approx(expected)
+
+
+def test_quantiles_that_cross_are_refused():
+    values, names = quantiles_of(0.0, -1.0, 0.0, np.where(np.arange(100) == 7, -0.1, 1.0))
+    with pytest.raises(EstimateError, match=r"mu_front_q50 is above mu_front_q95 at t = 0.07 s"):
+        score(values, names, ("mu_front",), a_recording(np.zeros(100)))
+
+
+def test_quantiles_of_an_angle_go_the_shorter_way_round():
+    records = np.zeros(100, record_type(("time", "yaw")))
+    records["time"], records["yaw"] = 0.01 * np.arange(100), -3.1
+    made, names = quantiles_of(3.1, 3.0, 3.1, -3.0, signal="yaw")  # -3 is 3.28 there
+    found = score(made, names, ("yaw",), Recording("r", 0, {}, records, records))["yaw"]
+    assert found["coverage_90"].value == 1.0
+    assert found["sharpness"].value == pytest.approx(2.0 * np.pi - 6.0)
+
+
+def test_innovations_count_from_the_first_scored_sample():
+    names = ("mu_front", "accel_x_innovation", "accel_x_innovation_variance")
+    made = np.zeros(100, record_type(names))
+    made["accel_x_innovation"] = np.random.default_rng(0).normal(0.0, 2.0, 100)
+    made["accel_x_innovation_variance"] = 4.0
+    found = score(made, names, ("mu_front",), a_recording(np.zeros(100), score_from=0.5))
+    assert found["mu_front"]["mean_nis"].count == 50
+    residual = made["accel_x_innovation"][50:]
+    assert found["mu_front"]["mean_nis"].value == pytest.approx(np.mean(residual**2) / 4.0)
 
 
 @pytest.mark.parametrize("name", ["mean_nees", "crps", "coverage_90", "sharpness"])

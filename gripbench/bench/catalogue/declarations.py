@@ -16,9 +16,10 @@ from types import ModuleType
 from typing import Any, Literal
 
 from gripbench.bench.catalogue.training import checked_training, training_of
-from gripbench.envs.signals import SIGNALS, VARIANCE, signal
+from gripbench.envs.signals import SIGNALS, signal
 from gripbench.errors import LONGEST, GripbenchError, InputError, nearest, one_line, unknown
 from gripbench.methods.contract import CompiledMethod
+from gripbench.methods.outputs import checked_quantiles, fields_of
 from gripbench.methods.settings import Variant
 
 
@@ -43,11 +44,13 @@ class Declaration:
     training_truth: tuple[str, ...] = ()
     trained: dict[str, Any] | None = None
     ranges: dict[str, tuple[float, float, float]] = field(default_factory=dict)
+    quantiles: dict[str, tuple[float, ...]] = field(default_factory=dict)
+    innovations: tuple[str, ...] = ()
 
     @property
     def outputs(self) -> tuple[str, ...]:
-        """Fields of its estimates: the signals, then their variances."""
-        return (*self.estimates, *(name + VARIANCE for name in self.variances))
+        """Fields of its estimates: signals, variances, quantiles, innovations."""
+        return fields_of(self.estimates, self.variances, self.quantiles, self.innovations)
 
     @property
     def idealised(self) -> tuple[str, ...]:
@@ -179,12 +182,13 @@ def declaration_of(
     given["baseline"] = bool(getattr(method, "baseline", False))
     given["files"] = getattr(method, "files", ())
     given |= training_of(method)
+    given["quantiles"] = getattr(method, "quantiles", None)
     given["file"] = str(getattr(module, "__file__", None) or "")
     return declaration_from(given, type(method).__name__)
 
 
 _TEXTS = ("name", "title", "reference")
-_NAMES = ("sensors", "estimates", "variances", "vehicle_parameters")
+_NAMES = ("sensors", "estimates", "variances", "innovations", "vehicle_parameters")
 
 LONGEST_NAME = 100
 """Largest number of characters of a name, which is also that of a file."""
@@ -245,6 +249,8 @@ def declaration_from(given: Mapping[str, Any], kind: str = "method") -> Declarat
         baseline=given.get("baseline") is True,
         files=_files(given, name),
         **checked_training(given, name),
+        quantiles=checked_quantiles(name, given.get("quantiles"), estimates, variances),
+        innovations=_signals(given, name, "innovations"),
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,8 @@ from gripbench.bench.catalogue.declarations import Declaration
 from gripbench.bench.running.execution import ONLINE_SAMPLES
 from gripbench.bench.running.isolation.limits import CellFailure
 from gripbench.envs.recordings import Recording
-from gripbench.envs.signals import VARIANCE
+from gripbench.envs.signals import VARIANCE, difference
+from gripbench.methods.outputs import quantile_field
 from gripbench.methods.samples import select_channels
 
 SAMPLES = 2000
@@ -174,6 +176,20 @@ def _variance_not_negative(subject: Subject) -> None:
                 raise ExpectationError(f"{name}{VARIANCE} is as low as {lowest:g} {where}")
 
 
+def _quantiles_in_order(subject: Subject) -> None:
+    if not subject.declaration.quantiles:
+        raise NotApplicableError("it declares no quantiles")
+    for recording, _, estimates in _runs(subject):
+        for name, levels in subject.declaration.quantiles.items():
+            fields = [quantile_field(name, level) for level in levels]
+            for low, high in pairwise(fields):
+                offset = difference(name, estimates[high], estimates[low])
+                if (offset < 0.0).any():
+                    time = float(recording.observations["time"][int(np.argmax(offset < 0.0))])
+                    where = f"at t = {time:.6g} s in scenario {recording.scenario}"
+                    raise ExpectationError(f"{low} is above {high} {where}")
+
+
 def _online_and_batch_agree(subject: Subject) -> None:
     if not subject.batch:
         raise NotApplicableError("it has no batch form")
@@ -269,6 +285,10 @@ CHECKS: dict[str, tuple[Callable[[Subject], None], str]] = {
     "variance_not_negative": (
         _variance_not_negative,
         "keep the covariance positive: symmetrise it or use the Joseph form",
+    ),
+    "quantiles_in_order": (
+        _quantiles_in_order,
+        "sort the quantiles of a sample before they are returned",
     ),
     "online_and_batch_agree": (
         _online_and_batch_agree,

@@ -155,6 +155,8 @@ def _method(name: str) -> dict[str, Any]:
         "idealised": list(declaration.idealised),
         "estimates": list(declaration.estimates),
         "variances": list(declaration.variances),
+        "quantiles": {name: list(levels) for name, levels in declaration.quantiles.items()},
+        "innovations": list(declaration.innovations),
         "vehicle_parameters": list(declaration.vehicle_parameters),
         "settings": declaration.settings,
     }

@@ -8,6 +8,6 @@ LOGS = "Logs of real vehicles"
 
 ORDER = (
     "reproduce", "evidence", "figures", "run", "check", "outside", "plot", "catalogue",
-    "rank", "results",
+    "rank", "consistency", "results",
 )  # fmt: skip
 """Modules whose commands come first in `--help`, in this order."""

@@ -40,22 +40,43 @@ def plot(
         Path | None, typer.Option(help="File name without suffix; by default under RESULTS/plots.")
     ] = None,
     results: Annotated[Path, typer.Option(help="Folder of results.")] = DEFAULT_RESULTS,
+    draw: Annotated[
+        str,
+        typer.Option(
+            help="run: truth, estimates and errors of one run. reliability, nees: what methods "
+            "state of their errors, over many runs."
+        ),
+    ] = "run",
+    seeds: Annotated[
+        int, typer.Option(min=1, help="Runs that reliability and nees are taken over.")
+    ] = 20,
     dpi: Annotated[int, typer.Option(min=30, max=1200, help="Dots an inch of the PNG.")] = 150,
 ) -> None:
-    """Draw a signal of one run, truth against estimates and their errors, as PNG and PDF."""
+    """Draw a signal of one run, or what methods state of their errors in it, as PNG and PDF."""
+    from gripbench.bench.publishing.figures.calibration import nees_plot, reliability_plot
     from gripbench.bench.publishing.figures.run_plot import run_plot, usual_signal
     from gripbench.bench.publishing.figures.runs import Runs
     from gripbench.bench.publishing.figures.style import save, style
+    from gripbench.errors import InputError, unknown
     from gripbench.writing import check_writable
 
+    over_runs = {"reliability": reliability_plot, "nees": nees_plot}
+    if draw != "run" and draw not in over_runs:
+        raise unknown("picture", draw, ("run", *over_runs))
     chosen = split_methods(methods)
+    if draw != "run" and not chosen:
+        raise InputError(f"--draw {draw} needs --methods: name those whose errors are judged")
     runs = Runs()
     signal = signal or usual_signal(runs, scenario, chosen, seed)
     if output is None:
-        output = results / "plots" / f"{Path(scenario).stem}_{signal}_{seed}"
+        what = seed if draw == "run" else draw
+        output = results / "plots" / f"{Path(scenario).stem}_{signal}_{what}"
     check_writable(output.parent / f"{output.name}.png")
     with style():
-        figure = run_plot(runs, scenario, chosen, signal, seed, start, end)
+        if draw == "run":
+            figure = run_plot(runs, scenario, chosen, signal, seed, start, end)
+        else:
+            figure = over_runs[draw](runs, scenario, chosen, signal, seeds)
         paths = save(figure, output.parent, output.name.removesuffix(".png"), dpi)
     typer.echo("Written: " + ", ".join(str(path) for path in paths))
 

@@ -42,6 +42,13 @@ def rank(
     reference: Annotated[
         str, typer.Option(help="Method whose score is 1; by default the board's geometric mean.")
     ] = "",
+    by: Annotated[
+        str,
+        typer.Option(
+            help="rms: by the errors. crps: by what the methods state of their errors, on boards "
+            "of uncertainty."
+        ),
+    ] = "rms",
     confidence: Annotated[float, typer.Option(help="Confidence of ranks and intervals.")] = 0.95,
     format_: Annotated[
         str, typer.Option("--format", help="terminal, text, markdown, csv, latex or html.")
@@ -67,6 +74,7 @@ def rank(
         labels=method or (),
         reference=reference,
         confidence=confidence,
+        by=by,
     )
     show_boards(found, format_, wide, wins)
 

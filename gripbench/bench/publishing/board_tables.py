@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from gripbench.bench.publishing.columns import Column, Table
+from gripbench.bench.publishing.consistency_table import uncertainty_columns
 from gripbench.bench.publishing.timings import RelativeRuntime
 from gripbench.bench.ranking.answers import Answer
 from gripbench.bench.ranking.plans import plan_of
@@ -45,7 +46,8 @@ def board_table(board: Board, timings: Timings | None = None, wide: bool = False
         own, every metric that has a value, quantiles of the step and deadlines. Otherwise at most
         nine columns.
     """
-    columns = _wide(board, timings is not None) if wide else _narrow(board)
+    narrow = _narrow if board.by == "rms" else uncertainty_columns
+    columns = _wide(board, timings is not None) if wide else narrow(board)
     rows = [
         _row(line, board.target, timings or {}, _decimals(board))
         for line in board.lines.to_dict("records")
@@ -99,6 +101,8 @@ def _wide(board: Board, relative: bool) -> tuple[Column, ...]:
         Column("elsewhere", f"Score in another scenario ({percent})"),
         Column("rms", "RMS", unit, ".4g"),
         Column("rmses", f"RMS ({percent})", unit),
+        Column("uncertainty", "What it says of its error"),
+        Column("nees_band", f"NEES of a consistent one ({percent})"),
         Column("skill", "Skill", format=".3f"),
         Column("beats_guess", "Better than a guess in", "% of drives", ".0f"),
         Column("beats_next", "Better than the next in", "% of drives", ".0f"),
@@ -127,7 +131,15 @@ def _notes(board: Board, wide: bool) -> tuple[str, ...]:
         "is marked may be the best; ranks in brackets hold together.",
         *board.notes,
     ]
-    if not wide:
+    if not wide and board.by == "crps":
+        guess = f" Skill: 1 - score / score of {board.guess}." if board.guess else ""
+        notes.append(
+            "Score: of the mean continuous ranked probability score, for a stated distribution "
+            "that is narrow and true." + guess + " In 90 %: share of samples within the stated "
+            "90 % interval, and its width. A verdict's factor is on the standard deviation; n/a: "
+            "no distribution in every run."
+        )
+    elif not wide:
         if board.guess:
             notes.append(
                 f"Skill: 1 - score / score of the best guess ({board.guess}); > guess, > next: "
@@ -314,6 +326,8 @@ def _row(line: Mapping[Any, Any], target: str, timings: Timings, format_: str) -
         **_metric_cells(line, target),
         "name": _name(line),
         "place": _place(line),
+        "nees_band": _range(line["nees_low"], line["nees_high"], ".2f"),
+        "percent_90": _percent(line["coverage_90"]),
         "initials": "".join(sorted(map(_initial, _instruments(line["reads"])))),
         "beats_guess": _times(line["beats_guess"], 100.0),
         "beats_next": _times(line["beats_next"], 100.0),
@@ -378,7 +392,9 @@ def _percent(share: float) -> str | None:
 
 
 def _place(line: Mapping[Any, Any]) -> str:
-    """Return the rank with the ranks that it may have."""
+    """Return the rank with the ranks that it may have; what has no score there has none."""
+    if line["by"] == "crps" and pd.isna(line["score"]):
+        return "n/a"
     if line["rank_from"] == line["rank_to"]:
         return str(line["rank"])
     return f"{line['rank']} ({line['rank_from']}–{line['rank_to']})"

@@ -78,6 +78,8 @@ class Leaderboard(Configuration):
     faults
         What each fault does to each method: the columns of
         `gripbench.bench.ranking.degradation.COLUMNS`.
+    uncertainty
+        As `boards`, those of uncertainty, which are ranked by CRPS.
     runtimes
         Relative runtimes by label and form; empty without timings.
     runs
@@ -90,6 +92,7 @@ class Leaderboard(Configuration):
     answers: tuple[dict[str, Any], ...] = ()
     boards: tuple[dict[str, Any], ...]
     faults: tuple[dict[str, Any], ...] = ()
+    uncertainty: tuple[dict[str, Any], ...] = ()
     runtimes: dict[str, dict[str, RelativeRuntime]] = Field(default_factory=dict)
     runs: tuple[Runs, ...]
 
@@ -144,7 +147,12 @@ def build(
     for target in dict.fromkeys(board.target for board in found):
         if len({board.sensors for board in found if board.target == target}) > 1:
             found += boards(rows, target, ANY, confidence=confidence)
-    found.sort(key=lambda board: (standing_of(board), opening(board.sensors) > 0, board.target))
+    found += uncertainty_boards(rows, confidence)
+    found.sort(
+        key=lambda board: (
+            standing_of(board), board.by == "crps", opening(board.sensors) > 0, board.target,
+        )
+    )  # fmt: skip
     return (
         Leaderboard(
             gripbench=gripbench.__version__,
@@ -153,13 +161,22 @@ def build(
                 {key: _plain(value) for key, value in vars(one).items()}
                 for one in answers(rows, sorted(set(rows["target"]) - {""}))
             ),
-            boards=tuple(_content(board) for board in found),
+            boards=tuple(_content(board) for board in found if board.by == "rms"),
+            uncertainty=tuple(_content(board) for board in found if board.by == "crps"),
             faults=tuple(_lines(damage)),
             runtimes={label: dict(forms) for label, forms in (timings or {}).items()},
             runs=tuple(runs_of(rows)),
         ),
         found,
     )
+
+
+def uncertainty_boards(rows: pd.DataFrame, confidence: float = CONFIDENCE) -> list[Board]:
+    """Return the boards by CRPS with all methods of a target, where a method has a CRPS at all."""
+    stated = rows[rows["crps"].notna()]
+    targets = sorted(set(stated.loc[~stated["baseline"].astype(bool), "target"]) - {""})
+    found = [boards(rows, target, ANY, confidence=confidence, by="crps") for target in targets]
+    return [board for each in found for board in each if board.lines["score"].notna().any()]
 
 
 def write(folder: Path, leaderboard: Leaderboard, found: list[Board]) -> list[Path]:
@@ -227,7 +244,8 @@ def text_of(leaderboard: Leaderboard, found: list[Board]) -> str:
         "with all methods and what they read. Score: geometric mean over the scenarios of the "
         "pooled RMS, 1 is typical of the board; ranks and intervals hold with "
         f"{100 * leaderboard.confidence:g} % (paired over common seeds, bootstrap over runs, "
-        "Holm's correction). Failures rank last. `leaderboard.csv` and `gripbench rank --wide` "
+        "Holm's correction). Failures rank last. Boards of uncertainty rank what methods state of "
+        "their errors, by CRPS. `leaderboard.csv` and `gripbench rank --wide` "
         "have every column.",
         "",
     ]

@@ -108,6 +108,13 @@ def _overview(methods: Mapping[str, type[CompiledMethod]]) -> Table:
     return Table(columns, tuple(rows))
 
 
+def _stated(method: type[CompiledMethod], name: str) -> str:
+    """Return with what a method states the error of an estimate."""
+    if name in method.variances:
+        return ", with variance"
+    return ", with quantiles" if name in method.quantiles else ""
+
+
 def _entry(method: type[CompiledMethod], published: Leaderboard | None) -> str:
     """Return the section of one method."""
     made = method()
@@ -126,11 +133,7 @@ def _entry(method: type[CompiledMethod], published: Leaderboard | None) -> str:
                     "signal": name + mark,
                     "unit": item.unit,
                     "description": item.description
-                    + (
-                        ", with variance"
-                        if role == "estimates" and name in method.variances
-                        else ""
-                    ),
+                    + (_stated(method, name) if role == "estimates" else ""),
                 }
             )
     columns = (

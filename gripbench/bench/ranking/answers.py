@@ -16,6 +16,7 @@ from gripbench.bench.ranking.grids import opening
 from gripbench.bench.ranking.plans import plan_of, road_of, setting_of, standing
 from gripbench.bench.ranking.ranking import Board, boards
 from gripbench.bench.running.recorded_scenarios import PREFIX
+from gripbench.bench.scoring.consistency import SILENT
 from gripbench.envs.signals import IDEALISED, signal
 from gripbench.errors import InputError
 
@@ -79,8 +80,37 @@ def best_line(board: Board) -> Any | None:
     return None if real.empty else real.iloc[0]
 
 
+def words_of_uncertainty(board: Board) -> str:
+    """Return in words what a board by CRPS says: who states its errors best, who states none."""
+    shown = signal(board.target)
+    line = best_line(board)
+    silent = [str(name) for name in board.lines.loc[board.lines["uncertainty"] == SILENT, "label"]]
+    end = f" Without a word on their errors: {', '.join(silent)}." if silent else ""
+    if line is None:
+        return "No method that a vehicle could run states its errors in every drive." + end
+    unit = "" if shown.display_unit == "-" else f" {shown.display_unit}"
+    with_ = "With any sensors" if line["sensors"] == "any" else f"With {line['sensors']}"
+    text = (
+        f"{with_} {line['label']} knows its errors best: CRPS "
+        f"{shown.display_factor * line['crps']:.3g}{unit} over {int(line['cells'])} drives, "
+        f"{line['uncertainty']}"
+    )
+    if pd.notna(line["coverage_90"]):
+        text += f" (its 90 % interval holds the truth in {100 * line['coverage_90']:.0f} %)"
+    if board.guess and line["verdict"]:
+        text += f"; {board.guess} says no less"
+    elif board.guess:
+        text += (
+            f"; better than what {board.guess} says in "
+            f"{100 * line['beats_guess']:.0f} % of the drives"
+        )
+    return text + "." + end
+
+
 def words(board: Board) -> str:
     """Return in words what a board says: what to take, how good it is, what may be as good."""
+    if board.by == "crps":
+        return words_of_uncertainty(board)
     line = best_line(board)
     if line is None:
         return "No method that a vehicle could run finished every drive."

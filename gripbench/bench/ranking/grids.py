@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
+from gripbench.bench.ranking.measures import RMS, Measure
 from gripbench.bench.ranking.plans import plan_of
 from gripbench.bench.running.recorded_scenarios import PREFIX
 from gripbench.envs.signals import SIGNALS, signal
@@ -43,12 +44,14 @@ class Grid:
         Scenarios with one common seed only, such as logs.
     rows
         The rows of all methods, failures among them, in these runs.
-    sums_of_squares, counts
-        Of the complete methods, shape (scenarios, seeds, labels).
-    single_rms
-        RMS of the complete methods in the single runs, shape (single, labels).
+    totals, counts
+        What the measure sums up, of the complete methods, shape (scenarios, seeds, labels).
+    single_values
+        Its value for the complete methods in the single runs, shape (single, labels).
     notes
         What was left out, one sentence each.
+    measure
+        What is compared.
     """
 
     target: str
@@ -58,10 +61,11 @@ class Grid:
     seeds: tuple[int, ...]
     single: tuple[str, ...]
     rows: pd.DataFrame
-    sums_of_squares: npt.NDArray[np.float64]
+    totals: npt.NDArray[np.float64]
     counts: npt.NDArray[np.float64]
-    single_rms: npt.NDArray[np.float64]
+    single_values: npt.NDArray[np.float64]
     notes: tuple[str, ...]
+    measure: Measure = RMS
 
     @property
     def cells(self) -> int:
@@ -250,7 +254,9 @@ def _connected(groups: Iterable[set[str]]) -> list[set[str]]:
     return sorted(unions, key=min)
 
 
-def grid_of(lines: pd.DataFrame, target: str, notes: Iterable[str] = ()) -> Grid:
+def grid_of(
+    lines: pd.DataFrame, target: str, notes: Iterable[str] = (), measure: Measure = RMS
+) -> Grid:
     """Return the common runs of the methods of a board.
 
     Parameters
@@ -261,6 +267,8 @@ def grid_of(lines: pd.DataFrame, target: str, notes: Iterable[str] = ()) -> Grid
         Signal that is estimated.
     notes
         What was left out already.
+    measure
+        What is compared.
 
     Raises
     ------
@@ -296,10 +304,11 @@ def grid_of(lines: pd.DataFrame, target: str, notes: Iterable[str] = ()) -> Grid
         seeds=seeds,
         single=tuple(single),
         rows=lines,
-        sums_of_squares=tables.of("sum_of_squares", repeated, len(seeds)),
-        counts=tables.of("count", repeated, len(seeds)),
-        single_rms=tables.of("rms", single, 1)[:, 0, :],
+        totals=tables.of(measure.total, repeated, len(seeds)),
+        counts=tables.of(measure.count, repeated, len(seeds)),
+        single_values=tables.of(measure.name, single, 1)[:, 0, :],
         notes=(*notes, *more_notes),
+        measure=measure,
     )
 
 

@@ -10,7 +10,9 @@ import pandas as pd
 
 from gripbench.bench.ranking import statistics
 from gripbench.bench.ranking.grids import instruments
+from gripbench.bench.ranking.measures import SILENT as SILENT_STATUS
 from gripbench.bench.ranking.summary import outside_of, training_of
+from gripbench.bench.scoring.consistency import SILENT, RunsTest, runs_test
 from gripbench.bench.scoring.metric import Metric, pooled_rms
 from gripbench.bench.scoring.metrics import metrics
 
@@ -56,10 +58,43 @@ def method_line(group: pd.DataFrame, complete: bool, settings: Settings) -> dict
         "deadline_misses": good["deadline_misses"].astype(float).mean(),
         "reason": "" if complete else _reason(bad),
     }
+    line |= uncertainty(group, settings.confidence)
     for metric in metrics().values():
         if metric.name != "rms":
             line |= _pooled(metric, good if complete else good.iloc[:0])
     return line
+
+
+def uncertainty(group: pd.DataFrame, confidence: float) -> dict[str, Any]:
+    """Return the verdict on what a method states of its errors, and the band of a consistent one.
+
+    The runs of one seed count as one: they have the same streams of the sensors. A method with a
+    run that failed has no verdict.
+    """
+    verdict, low, high = "n/a", np.nan, np.nan
+    test = tested(group, "mean_nees", confidence)
+    if test is not None:
+        verdict, low, high = test.verdict, test.low, test.high
+    elif group["status"].isin(["ok", SILENT_STATUS]).all() and not states(group):
+        verdict = SILENT
+    return {"uncertainty": verdict, "nees_low": low, "nees_high": high}
+
+
+def states(group: pd.DataFrame) -> bool:
+    """Return whether a method states anything of its errors in these runs."""
+    return "crps" in group and bool(group["crps"].notna().any())
+
+
+def tested(group: pd.DataFrame, metric: str, confidence: float) -> RunsTest | None:
+    """Return the test of a metric of normalised squares over runs, seeds as the unit.
+
+    None where a run failed or has no value.
+    """
+    columns = [f"{metric}_total", f"{metric}_count"]
+    if not {metric, *columns} <= set(group) or group[metric].isna().any():
+        return None
+    sums = group.groupby("seed")[columns].sum()
+    return runs_test(sums[columns[0]], sums[columns[1]], confidence)
 
 
 def _pooled(metric: Metric, good: pd.DataFrame) -> dict[str, float]:

@@ -30,21 +30,21 @@ from gripbench.bench.ranking.grids import (
     sensor_sets,
 )
 from gripbench.bench.ranking.log_windows import scored_windows
+from gripbench.bench.ranking.measures import RMS, measure_of
 from gripbench.bench.ranking.method_lines import Settings, method_line
 from gripbench.bench.ranking.pareto import pareto_front
 from gripbench.bench.ranking.plans import plan_of
-from gripbench.bench.ranking.resolution import resolution
 from gripbench.bench.ranking.skill import against_guess, best_baseline
 from gripbench.bench.running.recorded_scenarios import PREFIX
 from gripbench.bench.scoring.metrics import metrics
 from gripbench.errors import InputError, unknown
 
 _BEFORE = (
-    "target", "sensors", "rank", "rank_from", "rank_to", "group", "label", "method", "variant",
-    "title", "reads", "idealised", "baseline", "computed_outside", "training", "score",
-    "score_from",
-    "score_to", "elsewhere_from", "elsewhere_to", "skill", "verdict", "beats_guess", "beats_next",
-    "worse_than_guess", "rms", "rms_from", "rms_to",
+    "target", "sensors", "by", "rank", "rank_from", "rank_to", "group", "label", "method",
+    "variant", "title", "reads", "idealised", "baseline", "computed_outside", "training",
+    "score", "score_from", "score_to", "elsewhere_from", "elsewhere_to", "skill", "verdict",
+    "beats_guess", "beats_next", "worse_than_guess", "uncertainty", "nees_low", "nees_high",
+    "rms", "rms_from", "rms_to",
 )  # fmt: skip
 _SCORES = ("score", "score_from", "score_to", "elsewhere_from", "elsewhere_to")
 _BEHIND = (
@@ -90,14 +90,16 @@ class Board:
     guess
         The best baseline that these instruments allow; empty: none was run.
     runs
-        RMS of each run (index scenario, seed) and method; NaN for a failure.
+        RMS (or CRPS) of each run (index scenario, seed) and method; NaN for a failure.
     p_better
-        Adjusted p-value that the method of the row has a lower RMS than that of the column.
+        Adjusted p-value that the method of the row has a lower one than that of the column.
     wins
-        Runs in which the method of the row has a lower RMS than that of the column, half for a
+        Runs in which the method of the row has a lower one than that of the column, half for a
         draw; a failure loses.
     notes
         What was left out, one sentence each.
+    by
+        What it ranks by: `rms`, or `crps` for a board of uncertainty.
     """
 
     target: str
@@ -112,6 +114,7 @@ class Board:
     p_better: pd.DataFrame
     wins: pd.DataFrame
     notes: tuple[str, ...]
+    by: str = "rms"
 
 
 def rank(
@@ -125,6 +128,7 @@ def rank(
     confidence: float = statistics.CONFIDENCE,
     resamples: int = statistics.RESAMPLES,
     seed: int = 0,
+    by: str = "rms",
 ) -> pd.DataFrame:
     """Rank methods from their rows.
 
@@ -145,6 +149,8 @@ def rank(
         Confidence that all claims of a board hold together, and of each interval of score and RMS.
     resamples, seed
         Bootstrap resamples and their seed.
+    by
+        What to rank by: `rms`, the errors; `crps`, what the methods state of their errors.
 
     Returns
     -------
@@ -165,6 +171,7 @@ def rank(
         confidence=confidence,
         resamples=resamples,
         seed=seed,
+        by=by,
     )
     return pd.concat([board.lines for board in found], ignore_index=True)
 
@@ -180,11 +187,14 @@ def boards(
     confidence: float = statistics.CONFIDENCE,
     resamples: int = statistics.RESAMPLES,
     seed: int = 0,
+    by: str = "rms",
 ) -> list[Board]:
     """Return the boards behind `rank`, with their comparisons; parameters and errors as there."""
     if not 0.5 <= confidence < 1.0:
         raise InputError(f"confidence is {confidence:g}; it must be from 0.5 to below 1")
+    measure = measure_of(by)
     rows = without_faults(_only(_only(rows, "scenario", scenarios), "label", labels))
+    rows = measure.scored(rows)
     targets = [target] if isinstance(target, str) else list(target)
     known = [str(name) for name in rows["target"].unique() if name]
     for name in targets:
@@ -200,7 +210,7 @@ def boards(
         for allowed in sensor_sets(ran) if given == () else [given]:
             parts = on_board(rows, name, allowed)
             for lines, notes in parts:
-                grid = grid_of(lines, name, notes)
+                grid = grid_of(lines, name, notes, measure)
                 found.append(_board(grid, allowed, len(parts) > 1, settings))
     if not found:
         raise InputError("nothing to rank: every run was skipped")
@@ -224,7 +234,8 @@ def _board(
     with_ = "any sensors" if allowed is None else ", ".join(allowed) or "no sensors"
     plan = plan_of(scenarios[0]) if scenarios else ""
     named = bool(plan) and not plan.startswith(PREFIX)
-    title = f"{target} with {with_}" + (f" ({plan})" if named else "")
+    what = target if grid.measure is RMS else f"Uncertainty of {target}"
+    title = f"{what} with {with_}" + (f" ({plan})" if named else "")
     ranks, p_better = _ranks(grid, settings)
     lines = pd.DataFrame(
         [
@@ -234,15 +245,17 @@ def _board(
     )
     lines["target"] = target
     lines["sensors"] = ANY if allowed is None else ", ".join(allowed)
+    lines["by"] = grid.measure.name
     lines["cells"] = grid.cells
     lines["seeds"] = len(grid.seeds) or 1
     lines["scenarios"] = len(grid.scenarios) + len(grid.single)
     lines["pareto"] = pareto_front(lines["score"], lines["step_batch"])
     lines = lines.sort_values(["rank", "label"], ignore_index=True)
     order = list(lines["label"])
-    runs = grid.rows.assign(rms=grid.rows["rms"].where(grid.rows["status"] == "ok"))
+    value = grid.measure.name
+    runs = grid.rows.assign(**{value: grid.rows[value].where(grid.rows["status"] == "ok")})
     matrix = runs.pivot_table(
-        index=["scenario", "seed"], columns="label", values="rms", dropna=False
+        index=["scenario", "seed"], columns="label", values=value, dropna=False
     ).reindex(columns=order)
     wins = statistics.wins(matrix.to_numpy(float))
     lines = against_guess(lines, matrix, wins, grid)[list(columns())]
@@ -260,6 +273,7 @@ def _board(
         p_better=p_better.reindex(index=complete, columns=complete),
         wins=pd.DataFrame(wins, index=order, columns=order),
         notes=(*(f"Scored: {text}." for text in scored_windows(grid.rows).values()), *grid.notes),
+        by=grid.measure.name,
     )
 
 
@@ -270,12 +284,13 @@ def _ranks(grid: Grid, settings: Settings) -> tuple[dict[str, dict[str, Any]], p
     p = np.ones((len(labels), len(labels)))
     if labels:
         scores = statistics.mean_log_rms(
-            grid.sums_of_squares,
+            grid.totals,
             grid.counts,
-            grid.single_rms,
+            grid.single_values,
             settings.resamples,
             settings.seed,
-            resolution(grid.target),
+            grid.measure.floor(grid.target),
+            grid.measure.rooted,
         )
         p = statistics.adjusted_p_better(scores)
         better = p <= 1.0 - settings.confidence

@@ -13,7 +13,6 @@ import numpy.typing as npt
 import pandas as pd
 
 from gripbench.bench.ranking.grids import Grid
-from gripbench.bench.ranking.resolution import resolution
 
 NO_BETTER = "no better than a guess"
 """Verdict on a method whose skill is not positive."""
@@ -73,14 +72,16 @@ def against_guess(
         if not lines.loc[i, "baseline"] and score >= by_guess * (1.0 - 1e-9):
             lines.loc[i, "verdict"] = NO_BETTER
         if i != place:
-            least = resolution(grid.target)
+            least = grid.measure.floor(grid.target)
             worse = pooled[label].clip(lower=least) > pooled[guess].clip(lower=least)
             lines.loc[i, "worse_than_guess"] = ", ".join(pooled.index[worse])
     return lines
 
 
 def _pooled(grid: Grid) -> pd.DataFrame:
-    """Return the pooled RMS by scenario and method, of the methods that finished every run."""
+    """Return the pooled value by scenario and method, of the methods that finished every run."""
+    measure = grid.measure
     good = grid.rows[grid.rows["label"].isin(grid.labels)]
-    sums = good.groupby(["scenario", "label"])[["sum_of_squares", "count"]].sum()
-    return pd.DataFrame((sums["sum_of_squares"] / sums["count"]).pow(0.5).unstack("label"))
+    sums = good.groupby(["scenario", "label"])[[measure.total, measure.count]].sum()
+    means = sums[measure.total] / sums[measure.count]
+    return pd.DataFrame(means.pow(0.5 if measure.rooted else 1.0).unstack("label"))

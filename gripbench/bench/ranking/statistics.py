@@ -85,6 +85,7 @@ def mean_log_rms(
     resamples: int = RESAMPLES,
     seed: int = 0,
     smallest: float = 0.0,
+    rooted: bool = True,
 ) -> Scores:
     """Return the methods' mean log RMS over scenarios, and its paired bootstrap over the runs.
 
@@ -105,12 +106,15 @@ def mean_log_rms(
         another method on the board changes nothing between two others.
     smallest
         RMS below which no scenario counts as better.
+    rooted
+        Whether a value is the root of the mean, as of the RMS; else it is the mean itself.
     """
     scenarios, runs, methods = sums_of_squares.shape
     fixed = np.empty((0, methods)) if fixed_rms is None else fixed_rms
     if scenarios + len(fixed) == 0:
         raise InputError("statistics: no scenario to compare in")
-    pooled = np.sqrt(sums_of_squares.sum(axis=1) / counts.sum(axis=1))
+    of_mean = np.sqrt if rooted else np.asarray
+    pooled = of_mean(sums_of_squares.sum(axis=1) / counts.sum(axis=1))
     floor = _SMALLEST_SHARE * np.concatenate([pooled, fixed]).max(axis=1, initial=0.0)
     floor = np.maximum(floor, max(smallest, np.finfo(float).tiny))[:, None]
     constant = np.log(np.maximum(fixed, floor[scenarios:]))
@@ -119,7 +123,7 @@ def mean_log_rms(
     drawn = draws(runs, resamples, seed)
     logs = np.zeros((resamples, methods))
     for squares, count, low in zip(sums_of_squares, counts, floor, strict=False):
-        logs += np.log(np.maximum(np.sqrt((drawn @ squares) / (drawn @ count)), low))
+        logs += np.log(np.maximum(of_mean((drawn @ squares) / (drawn @ count)), low))
     replicates = (logs + constant.sum(axis=0)) / (scenarios + len(fixed))
     return Scores(by_scenario.mean(axis=0), replicates, runs, by_scenario)
 

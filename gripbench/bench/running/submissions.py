@@ -31,11 +31,18 @@ from gripbench.bench.running.recorded_scenarios import (
 )
 from gripbench.bench.running.rows import Row, Status
 from gripbench.bench.running.store import Store
-from gripbench.bench.scoring.scoring import DivergedError, Scores, score, targets_of
+from gripbench.bench.scoring.scoring import (
+    DivergedError,
+    EstimateError,
+    Scores,
+    score,
+    targets_of,
+)
 from gripbench.envs.recordings import Recording
 from gripbench.envs.scenarios import Scenario
-from gripbench.envs.signals import SIGNALS, VARIANCE, record_type
+from gripbench.envs.signals import INNOVATION, SIGNALS, VARIANCE, record_type, signal
 from gripbench.errors import InputError, unknown
+from gripbench.methods.outputs import fields_of, quantile_levels
 from gripbench.methods.samples import is_given
 from gripbench.sources import digest
 
@@ -61,9 +68,23 @@ class Estimates:
 
     @property
     def outputs(self) -> tuple[str, ...]:
-        """Names of the estimates, then of their variances."""
-        names = [name for name in self.columns if name != "time"]
-        return tuple(sorted(names, key=lambda name: (name.endswith(VARIANCE), name)))
+        """Names of the estimates, then of their variances, quantiles and of innovations."""
+        return fields_of(**self.declared)
+
+    @property
+    def declared(self) -> dict[str, Any]:
+        """What the columns declare, see `gripbench.methods.outputs`."""
+        names = sorted(name for name in self.columns if name != "time")
+        estimates = [name for name in names if name in SIGNALS]
+        levels = {name: tuple(quantile_levels(name, names).values()) for name in estimates}
+        return {
+            "estimates": tuple(estimates),
+            "variances": tuple(name for name in estimates if name + VARIANCE in names),
+            "quantiles": {name: given for name, given in levels.items() if given},
+            "innovations": tuple(
+                name.removesuffix(INNOVATION) for name in names if name.endswith(INNOVATION)
+            ),
+        }
 
 
 def submit(
@@ -118,7 +139,7 @@ def submit(
         _check_times(found, recording)
         if declaration is None:
             outputs = found.outputs
-            declaration = _declaration(name, title, channels, outputs, found.path)
+            declaration = _declaration(name, title, channels, found)
         elif found.outputs != outputs:
             raise InputError(
                 f"{found.path}: has the estimates {', '.join(found.outputs)}, another drive has "
@@ -153,21 +174,22 @@ def _checked_reads(reads: Iterable[str]) -> tuple[str, ...]:
     return channels
 
 
-def _declaration(
-    name: str, title: str, channels: tuple[str, ...], outputs: tuple[str, ...], path: Path
-) -> Declaration:
+def _declaration(name: str, title: str, channels: tuple[str, ...], found: Estimates) -> Declaration:
     if name in method_names():
         raise InputError(f"--name '{name}' is that of a method that is known here; give another")
-    estimates = tuple(item for item in outputs if not item.endswith(VARIANCE))
-    variances = tuple(item.removesuffix(VARIANCE) for item in outputs if item.endswith(VARIANCE))
-    for item in variances:
-        if item not in estimates:
-            raise InputError(f"{path}: column '{item}{VARIANCE}' stands without '{item}'")
-    if not estimates:
-        raise InputError(f"{path}: holds no estimate; add a column for each signal")
+    outputs = found.outputs
+    for column in found.columns:
+        if column != "time" and column not in outputs:
+            plain = signal(column).description
+            raise InputError(f"{found.path}: column '{column}' ({plain}) stands alone")
+    for column in outputs:
+        if column not in found.columns:
+            raise InputError(f"{found.path}: has no column '{column}'")
+    if not found.declared["estimates"]:
+        raise InputError(f"{found.path}: holds no estimate; add a column for each signal")
     given: dict[str, Any] = {
-        "name": name, "title": title or None, "sensors": channels, "estimates": estimates,
-        "variances": variances, "settings": {}, "variant": "",
+        "name": name, "title": title or None, "sensors": channels, **found.declared,
+        "settings": {}, "variant": "",
     }  # fmt: skip
     return declaration_from(given, "--name")
 
@@ -203,7 +225,7 @@ def read_estimates(folder: Path) -> Estimates:
     ------
     InputError
         If there is no file of them or more than one, it cannot be read, or a column is no signal
-        and no variance of one.
+        and says nothing of one.
     """
     paths = [path for path in (folder / f"estimates.{kind}" for kind in FORMATS) if path.exists()]
     if len(paths) != 1:
@@ -225,8 +247,10 @@ def read_estimates(folder: Path) -> Estimates:
     if "time" not in columns:
         raise InputError(f"{path}: has no column 'time'; copy that of the observations")
     for name in columns:
-        if name.removesuffix(VARIANCE) not in SIGNALS:
-            raise unknown(f"estimate in {path}:", name, SIGNALS)
+        try:
+            signal(name)
+        except InputError:
+            raise unknown(f"estimate in {path}:", name, SIGNALS) from None
     return Estimates(path, columns)
 
 
@@ -327,6 +351,8 @@ def _scored(
         scores = score(estimates, declaration.outputs, targets, recording)
     except DivergedError as error:
         return _Result("diverged", str(error), targets, content=content)
+    except EstimateError as error:
+        raise InputError(f"{found.path}: {error}") from None
     return _Result("ok", "", tuple(scores), scores, content)
 
 

@@ -4,6 +4,10 @@ A consistent filter has normalised squared errors that follow a chi-square law, 
 without memory. The mean over n independent values with d degrees of freedom each lies, with the
 given confidence, in a band of the chi-square law with n d degrees of freedom.
 
+The samples of one run are not independent: a bias, or a car that differs from the one on paper,
+stays for the whole run. So the runs are what is counted (`runs_test`), and how many degrees of
+freedom each is worth is told by how far their means lie apart.
+
 References
 ----------
 Y. Bar-Shalom, X.-R. Li & T. Kirubarajan, Estimation with Applications to Tracking and Navigation,
@@ -12,11 +16,11 @@ Wiley 2001, section 5.4. G. M. Ljung & G. E. P. Box, Biometrika 65 (1978) 297.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
 
 from gripbench.errors import InputError
 
@@ -86,9 +90,115 @@ def chi_square_test(
     if values.size == 0 or not np.all(np.isfinite(values)):
         raise InputError("a chi-square test needs at least one value, all of them finite")
     freedom = values.size * degrees
-    low = float(stats.chi2.ppf(0.5 - confidence / 2.0, freedom)) / freedom
-    high = float(stats.chi2.ppf(0.5 + confidence / 2.0, freedom)) / freedom
+    low, high = _band(freedom, (1.0 - confidence) / 2.0)
     return ChiSquareTest(float(values.mean()) / degrees, low, high, values.size)
+
+
+def _band(freedom: float, tail: float) -> tuple[float, float]:
+    """Return between which ends the mean of squares of that freedom lies, `tail` on either side."""
+    from scipy.special import chdtri
+
+    return float(chdtri(freedom, 1.0 - tail)) / freedom, float(chdtri(freedom, tail)) / freedom
+
+
+CONSISTENT, SILENT = "consistent", "says nothing"
+"""Verdicts on a filter within its band, and on a method that states no uncertainty."""
+
+_FEWEST = 3
+_SAME = 1e-9  # relative spread of runs that are one and the same but for rounding
+
+
+@dataclass(frozen=True)
+class RunsTest:
+    """Mean normalised square of several runs with the band of a consistent filter.
+
+    Attributes
+    ----------
+    mean
+        Over all samples of all runs, per degree of freedom; 1 is ideal.
+    low, high
+        Band in which the mean of a consistent filter lies.
+    runs
+        Number of runs.
+    degrees
+        Degrees of freedom that the band rests on, all runs together.
+    """
+
+    mean: float
+    low: float
+    high: float
+    runs: int
+    degrees: float
+
+    @property
+    def factor(self) -> float:
+        """What the stated deviation is short of the errors: above 1 it is too small."""
+        return math.sqrt(self.mean)
+
+    @property
+    def factor_interval(self) -> tuple[float, float]:
+        """Interval of the factor, at the confidence of the band."""
+        return math.sqrt(self.mean / self.high), math.sqrt(self.mean / self.low)
+
+    @property
+    def verdict(self) -> str:
+        """In plain words what the mean says of the stated uncertainty."""
+        if self.low <= self.mean <= self.high:
+            return CONSISTENT
+        if self.mean > 1.0:
+            return f"overconfident by a factor {self.factor:.3g}"
+        if self.mean == 0.0:
+            return "cautious: there is no error"
+        return f"cautious by a factor {1.0 / self.factor:.3g}"
+
+
+def runs_test(
+    totals: npt.ArrayLike, counts: npt.ArrayLike, confidence: float = 0.95
+) -> RunsTest | None:
+    """Test the normalised squares (NEES or NIS) of independent runs.
+
+    Parameters
+    ----------
+    totals, counts
+        Sum over the samples of each run, and their number.
+    confidence
+        Probability of the band, between 0 and 1.
+
+    Returns
+    -------
+    None where a run has no value, or there is none: such a method says nothing.
+
+    Notes
+    -----
+    If a run is worth v degrees of freedom, the relative variance of the runs' means is 2 / v
+    (Satterthwaite). That variance is estimated from the runs themselves and widened by Student's
+    factor, because it is an estimate; the band is that of the chi-square law with v degrees for
+    each run, and leaves out two thirds of the share that it might, because runs may have heavier
+    tails than a normal law. With fewer than three runs, or where all are the same, each counts as
+    one degree of freedom: the errors of a whole run are one error. `python
+    tests/bench/nees_coverage.py` prints how often a consistent filter lies within.
+    """
+    total, number = np.asarray(totals, np.float64), np.asarray(counts, np.float64)
+    runs = total.size
+    if runs == 0 or not np.all(np.isfinite(total)) or not np.all(number > 0.0):
+        return None
+    mean = float(total.sum() / number.sum())
+    tail = (1.0 - confidence) / 3.0
+    freedom = float(runs)
+    if runs >= _FEWEST and mean > 0.0:
+        from scipy.special import ndtri, stdtrit
+
+        share = number * (total / number / mean - 1.0) / number.mean()
+        spread = math.sqrt(float(np.sum(share**2)) / (runs - 1))
+        if spread > _SAME:
+            student = float(stdtrit(runs - 1, 1.0 - tail) / ndtri(1.0 - tail))
+            freedom = runs * 2.0 / (student * spread) ** 2
+    low, high = _band(freedom, tail)
+    return RunsTest(mean, low, high, runs, freedom)
+
+
+LAGS = 10
+"""Lags of a whiteness test."""
 
 
 @dataclass(frozen=True)
@@ -115,7 +225,7 @@ class WhitenessTest:
         return self.p_value >= 0.05
 
 
-def whiteness_test(innovations: npt.ArrayLike, lags: int = 10) -> WhitenessTest:
+def whiteness_test(innovations: npt.ArrayLike, lags: int = LAGS) -> WhitenessTest:
     """Test whether innovations are white.
 
     The mean is not removed: the innovations of a right model have none, and one that stays is
@@ -133,6 +243,8 @@ def whiteness_test(innovations: npt.ArrayLike, lags: int = 10) -> WhitenessTest:
     InputError
         If there are too few values, one is not finite, or all are zero.
     """
+    from scipy.special import chdtrc  # slow to import, as in the whole module
+
     values = np.asarray(innovations, np.float64)
     n = len(values)
     if lags < 1 or n <= lags:
@@ -142,4 +254,4 @@ def whiteness_test(innovations: npt.ArrayLike, lags: int = 10) -> WhitenessTest:
         raise InputError("a whiteness test needs finite innovations that are not all zero")
     correlation = np.array([values[lag:] @ values[:-lag] for lag in range(1, lags + 1)]) / power
     statistic = n * (n + 2.0) * float(np.sum(correlation**2 / (n - np.arange(1, lags + 1))))
-    return WhitenessTest(correlation, 1.96 / np.sqrt(n), float(stats.chi2.sf(statistic, lags)))
+    return WhitenessTest(correlation, 1.96 / np.sqrt(n), float(chdtrc(lags, statistic)))

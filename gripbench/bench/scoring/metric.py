@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
+from gripbench.bench.scoring.distributions import Innovations, Normal, Quantiles, Stated
 from gripbench.configuration import Configuration
 from gripbench.envs.signals import signal
 from gripbench.errors import GripbenchError, InputError
@@ -72,6 +73,10 @@ class Context:
     bounded
         Whether only an interval is known of the signal; the truth is its point next to the
         estimate.
+    quantiles
+        The method's own quantiles; None where it gives none.
+    innovations
+        What the method shows of its innovations; None where it shows none.
     """
 
     target: str
@@ -80,6 +85,8 @@ class Context:
     variance: Floats | None
     channels: Callable[[str], Floats | None]
     bounded: bool = False
+    quantiles: Quantiles | None = None
+    innovations: Innovations | None = None
 
     @property
     def utilisation(self) -> Floats | None:
@@ -92,6 +99,17 @@ class Context:
         if self.variance is None or not np.all((self.variance > 0.0) & np.isfinite(self.variance)):
             return None
         return np.sqrt(self.variance)
+
+    def stated(self, error: Floats) -> Stated | None:
+        """Return what the method states of its error (estimate less truth); None: nothing.
+
+        Nor is there anything to hold it against where only an interval of the signal is known.
+        """
+        if self.bounded:
+            return None
+        if self.variance is not None and self.deviation is not None:
+            return Normal(error, self.deviation, self.variance)
+        return self.quantiles
 
 
 Compute = Callable[[Floats, Floats, Floats, Context], Any]

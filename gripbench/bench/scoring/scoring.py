@@ -9,16 +9,20 @@ the truth, so that no metric sees an error beyond half a turn.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from gripbench.bench.scoring.distributions import Innovations, Quantiles
 from gripbench.bench.scoring.metric import Context, Floats, Value
 from gripbench.bench.scoring.metrics import metrics
 from gripbench.envs.recordings import Recording
-from gripbench.envs.signals import VARIANCE, signal
+from gripbench.envs.signals import INNOVATION, VARIANCE, signal, wrapped
 from gripbench.errors import GripbenchError
+from gripbench.methods.outputs import quantile_levels
 
 Scores = dict[str, Value]
 """Values of one target in one run, by the name of the metric."""
@@ -53,7 +57,7 @@ def score(
     estimates
         Structured array, shape (n,), with the fields `outputs`.
     outputs
-        Estimates and variances that the method declares.
+        Estimates and what else the method writes, see `gripbench.methods.outputs`.
     targets
         Estimates to score.
     recording
@@ -66,7 +70,8 @@ def score(
     Raises
     ------
     EstimateError
-        If the estimates have another shape or other fields.
+        If the estimates have another shape or other fields, a variance is negative, or quantiles
+        cross.
     DivergedError
         If one of them is not finite, or too large to be squared.
     MetricError
@@ -79,32 +84,113 @@ def score(
         first = _first_not_finite(estimates[name])
         if first >= 0:
             raise DivergedError(f"{name} is {estimates[name][first]} from t = {times[first]:.6g} s")
+    _check_variances(estimates, outputs, times)
+    for name in targets:
+        _check_quantiles(name, quantile_levels(name, outputs), estimates, times)
     inside = times >= recording.score_from
-    bounded = {bound.signal for bound in recording.bounds}
+    innovations = _innovations(estimates, outputs, inside)
     scores = {}
     for name in targets:
         counted = inside & np.isfinite(truth[name])
         if not counted.any():
             continue
-        true = truth[name][counted]
-        estimate = on_branch(name, estimates[name][counted], true)
+        estimate, true, context = context_of(name, estimates, outputs, recording, counted)
         if _too_large(estimate, true):
             raise DivergedError(f"{name} is too large to be squared")
-        variance = name + VARIANCE
-        context = Context(
-            target=name,
-            score_from=recording.score_from,
-            notes=recording.notes,
-            variance=estimates[variance][counted] if variance in outputs else None,
-            channels=_Channels(truth, counted),
-            bounded=name in bounded,
-        )
+        context = replace(context, innovations=innovations)
         values = {
             metric.name: metric.of_run(times[counted], estimate, true, context)
             for metric in metrics().values()
         }
         scores[name] = {key: value for key, value in values.items() if value is not None}
     return scores
+
+
+def _quantiles(
+    name: str, levels: dict[str, float], estimates: npt.NDArray[Any], truth: Floats
+) -> Quantiles | None:
+    if not levels:
+        return None
+    offsets = np.array([_offset(name, field, estimates) for field in levels])
+    return Quantiles(truth, tuple(levels.values()), offsets)
+
+
+def _offset(name: str, field: str, estimates: npt.NDArray[Any]) -> Floats:
+    """Return a quantile less the estimate: of an angle the shorter way round."""
+    offset: Floats = estimates[field] - estimates[name]
+    return wrapped(offset) if signal(name).angle else offset
+
+
+def _check_variances(estimates: npt.NDArray[Any], outputs: tuple[str, ...], times: Floats) -> None:
+    for name in outputs:
+        if name.endswith(VARIANCE) and (estimates[name] < 0.0).any():
+            first = int(np.argmax(estimates[name] < 0.0))
+            raise EstimateError(
+                f"{name} is {estimates[name][first]:g} at t = {times[first]:.6g} s; a variance is "
+                "not negative"
+            )
+
+
+def _check_quantiles(
+    name: str, levels: dict[str, float], estimates: npt.NDArray[Any], times: Floats
+) -> None:
+    for low, high in pairwise(levels):
+        crossed = _offset(name, low, estimates) > _offset(name, high, estimates)
+        if crossed.any():
+            first = int(np.argmax(crossed))
+            raise EstimateError(
+                f"{low} is above {high} at t = {times[first]:.6g} s; quantiles must not cross"
+            )
+
+
+def _innovations(
+    estimates: npt.NDArray[Any], outputs: tuple[str, ...], inside: npt.NDArray[np.bool_]
+) -> Innovations | None:
+    shown = [name for name in outputs if name.endswith(INNOVATION) and name + VARIANCE in outputs]
+    if not shown:
+        return None
+    return Innovations(
+        {name: estimates[name][inside] for name in shown},
+        {name: estimates[name + VARIANCE][inside] for name in shown},
+    )
+
+
+def context_of(
+    name: str,
+    estimates: npt.NDArray[Any],
+    outputs: tuple[str, ...],
+    recording: Recording,
+    counted: npt.NDArray[np.bool_],
+) -> tuple[Floats, Floats, Context]:
+    """Return estimate, truth and what a metric may look at besides, in the samples that count.
+
+    Parameters
+    ----------
+    name
+        Signal that is estimated.
+    estimates, outputs, recording
+        As `score` takes them.
+    counted
+        Which samples count, shape (n,).
+    """
+    truth = recording.truth
+    true = truth[name][counted]
+    estimate = on_branch(name, estimates[name][counted], true)
+    variance = name + VARIANCE
+    levels = quantile_levels(name, outputs)
+    return (
+        estimate,
+        true,
+        Context(
+            target=name,
+            score_from=recording.score_from,
+            notes=recording.notes,
+            variance=estimates[variance][counted] if variance in outputs else None,
+            channels=_Channels(truth, counted),
+            bounded=name in {bound.signal for bound in recording.bounds},
+            quantiles=_quantiles(name, levels, estimates[counted], true - estimate),
+        ),
+    )
 
 
 class _Channels:

@@ -104,6 +104,17 @@ def predict(filter):
 
 
 @compiled
+def innovation_variance(filter, variance):
+    """Return what variance the innovation of a measurement with row `h` has, h' P h + variance."""
+    n = filter.x.shape[0]
+    total = variance
+    for i in range(n):
+        for j in range(n):
+            total += filter.h[i] * filter.P[i, j] * filter.h[j]
+    return total
+
+
+@compiled
 def correct_scalar(filter, residual, variance):
     """Take one measurement with row `h`; return its normalised innovation squared.
 

@@ -59,14 +59,18 @@ def predict_track(filter, span, speed, steer, friction, params, out):
 
 @compiled
 def correct_track(filter, span, speed, steer, friction, yaw_rate, accel_y, params, out):
-    """Take yaw rate and a_y; return their innovations squared over variance, and the variances."""
+    """Take yaw rate and a_y; return of each the distance, the variance and the innovation.
+
+    The distance is the innovation squared over its variance.
+    """
     x, h, P = filter.x, filter.h, filter.P
     n = x.shape[0]
     h[:] = 0.0
     h[1] = 1.0
     noise = params.gyro_noise**2 / span
     first = P[1, 1] + noise
-    distance = correct_scalar(filter, yaw_rate - x[1], noise)
+    rate = yaw_rate - x[1]
+    distance = correct_scalar(filter, rate, noise)
     evaluate_track(x, speed, steer, friction, params, out)
     for k in range(n):
         h[k] = _slope(out, 0, k, n)
@@ -75,9 +79,10 @@ def correct_track(filter, span, speed, steer, friction, yaw_rate, accel_y, param
     for i in range(n):
         for k in range(n):
             second += h[i] * P[i, k] * h[k]
-    other = correct_scalar(filter, accel_y - out[0, 0], noise)
+    accel = accel_y - out[0, 0]
+    other = correct_scalar(filter, accel, noise)
     if n > 2:
         x[n - 1] = min(max(x[n - 1], _LEAST), _LARGEST)
     if n == 5:
         x[2], x[3] = min(max(x[2], -1.0), 1.0), min(max(x[3], -1.0), 1.0)
-    return distance, first, other, second
+    return (distance, first, rate), (other, second, accel)

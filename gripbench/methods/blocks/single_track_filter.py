@@ -107,8 +107,23 @@ def write_lateral(inputs, speed_y, yaw_rate, variance, est):
     est.speed_y_variance = variance
 
 
+@compiled
+def write_no_innovations(est):
+    """Write that no reading has been taken in this sample."""
+    est.yaw_rate_innovation, est.yaw_rate_innovation_variance = 0.0, 0.0
+    est.accel_y_innovation, est.accel_y_innovation_variance = 0.0, 0.0
+
+
+@compiled
+def write_innovations(rate, accel, est):
+    """Write the innovations of yaw rate and a_y as `correct_track` returns them."""
+    est.yaw_rate_innovation_variance, est.yaw_rate_innovation = rate[1], rate[2]
+    est.accel_y_innovation_variance, est.accel_y_innovation = accel[1], accel[2]
+
+
 LATERAL_ESTIMATES = ("sideslip", "speed_y", "yaw_rate")
 LATERAL_VARIANCES = ("sideslip", "speed_y")
+LATERAL_INNOVATIONS = ("yaw_rate", "accel_y")
 
 
 @compiled

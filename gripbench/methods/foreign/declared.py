@@ -11,9 +11,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar
 
-from gripbench.envs.signals import VARIANCE
 from gripbench.envs.vehicles import require
 from gripbench.errors import unknown
+from gripbench.methods.outputs import fields_of
 from gripbench.methods.settings import Parameter, Setting, Variant, checked_settings
 
 
@@ -29,7 +29,8 @@ class ForeignMethod:
 
     Attributes
     ----------
-    name, title, reference, sensors, estimates, variances, vehicle_parameters, parameters, variants
+    name, title, reference, sensors, estimates, variances, quantiles, innovations, \
+    vehicle_parameters, parameters, variants
         As of a `CompiledMethod`.
     """
 
@@ -37,6 +38,8 @@ class ForeignMethod:
     sensors: ClassVar[tuple[str, ...]]
     estimates: ClassVar[tuple[str, ...]]
     variances: ClassVar[tuple[str, ...]] = ()
+    quantiles: ClassVar[Mapping[str, tuple[float, ...]]] = {}
+    innovations: ClassVar[tuple[str, ...]] = ()
     vehicle_parameters: ClassVar[tuple[str, ...]] = ()
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     variants: ClassVar[Mapping[str, Any]] = {}
@@ -50,8 +53,8 @@ class ForeignMethod:
 
     @property
     def outputs(self) -> tuple[str, ...]:
-        """Names of what it estimates: the signals, then their variances."""
-        return (*self.estimates, *(name + VARIANCE for name in self.variances))
+        """Names of what it writes: estimates, variances, quantiles, innovations."""
+        return fields_of(self.estimates, self.variances, self.quantiles, self.innovations)
 
     def place(self, file: str) -> Path:
         """Return the path of a file that is named relative to the method's own."""

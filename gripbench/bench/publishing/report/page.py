@@ -19,6 +19,7 @@ from gripbench.bench.publishing.board_tables import answer_table
 from gripbench.bench.publishing.columns import Table
 from gripbench.bench.publishing.degradation_table import degradation_tables, every_line
 from gripbench.bench.publishing.figures.style import SERIES
+from gripbench.bench.publishing.leaderboard import uncertainty_boards
 from gripbench.bench.publishing.manifest import commit
 from gripbench.bench.publishing.report.content import (
     PaperResult,
@@ -36,10 +37,11 @@ from gripbench.bench.publishing.report.content import (
     today,
 )
 from gripbench.bench.publishing.report.critical import critical_differences
+from gripbench.bench.publishing.report.reliability import reliability_diagram
 from gripbench.bench.publishing.report.series import POINTS, SeriesPlan, all_series
 from gripbench.bench.ranking.answers import answers
 from gripbench.bench.ranking.degradation import degradation, without_faults
-from gripbench.bench.ranking.plans import plan_of, setting_of
+from gripbench.bench.ranking.plans import plan_of, setting_of, standing_of
 from gripbench.bench.ranking.ranking import Board
 from gripbench.bench.ranking.summary import not_run
 from gripbench.bench.running.recorded_scenarios import PREFIX, at_hand, recorded_scenario
@@ -194,6 +196,7 @@ def page(
         "boards": "\n".join(_board(board) for board in found),
         "critical": "\n".join(critical_differences(board) for board in whole.values()),
         "faults": _faults(damage),
+        "uncertainty": _uncertainty(rows, targets),
         "papers": _papers(paper_results(results)),
         "failures": _failures(rows) + _notes(absent),
         "manifest": _manifest(manifests(results)),
@@ -265,6 +268,26 @@ def _board(board: Any) -> str:
         f'<div class="scroll" tabindex="0" role="region" aria-label="{title}, every column">\n'
         f"{tables.html(wide)}</div></details></div>"
     )
+
+
+def _uncertainty(rows: pd.DataFrame, targets: Sequence[str]) -> str:
+    """Return the boards of uncertainty with their reliability diagrams."""
+    found = uncertainty_boards(rows[rows["target"].isin(targets)])
+    found.sort(key=standing_of)
+    if not found:
+        return "<p>No method here states how large its errors are.</p>"
+    parts = []
+    for board in found:
+        setting = setting_of(board.scenarios[0]) if board.scenarios else ""
+        title = html.escape(board.title + (f", {setting}" if setting else ""))
+        said, narrow, _ = shown_board(board)
+        parts.append(
+            f"<details><summary>{title}</summary>"
+            f'<p class="answer">{html.escape(said)}</p>'
+            f'<div class="scroll" tabindex="0" role="region" aria-label="{title}">'
+            f"{tables.html(narrow)}</div>{reliability_diagram(board)}</details>"
+        )
+    return "\n".join(parts)
 
 
 def _answers(rows: pd.DataFrame, targets: Sequence[str]) -> str:

@@ -19,7 +19,7 @@ from gripbench.extensions import entry_points, load
 GROUP = "gripbench.metrics"
 """Entry point group of metrics."""
 
-_FIRST = ("accuracy", "convergence", "utilisation", "excitation", "calibration")
+_FIRST = ("accuracy", "convergence", "utilisation", "excitation", "calibration", "innovations")
 
 
 @cache
