@@ -1,12 +1,14 @@
 """Methods that know their errors, that do not, and that say nothing: verdicts, boards, commands."""
 
 import math
+from typing import ClassVar
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 import gripbench
+from gripbench.bench.catalogue.check import check_estimator
 from gripbench.bench.catalogue.declarations import declaration_from
 from gripbench.bench.command_line import application
 from gripbench.bench.publishing.leaderboard import build, read, write
@@ -14,7 +16,7 @@ from gripbench.bench.ranking.consistency import consistency
 from gripbench.bench.ranking.ranking import boards
 from gripbench.bench.scoring.consistency import CONSISTENT, SILENT
 from gripbench.errors import InputError
-from gripbench.methods.contract import CompiledMethod
+from gripbench.methods.contract import CompiledMethod, compiled
 
 SEEDS = 16
 
@@ -211,3 +213,63 @@ def test_quantiles_that_cannot_be_are_refused_in_one_line(quantiles, message):
 def test_an_innovation_of_no_signal_is_refused():
     with pytest.raises(InputError, match="'innovations' names the unknown signal 'acel_x'"):
         declaration_from({**GIVEN, "innovations": ("acel_x",)})
+
+
+@compiled
+def _say(state, obs, params, est):
+    state.count += 1.0
+    est.mu_front = 0.5
+    est.mu_front_q05 = 0.5 - 0.1 * state.count
+    est.mu_front_q95 = 0.5 + 0.1 * state.count
+    est.accel_x_innovation = obs.accel_x
+    est.accel_x_innovation_variance = 2.0
+
+
+class Compiled(CompiledMethod):
+    name = "compiled"
+    title = "Quantiles and innovations of a compiled step"
+    reference = "-"
+    sensors = ("accel_x",)
+    estimates = ("mu_front",)
+    quantiles: ClassVar = {"mu_front": (0.05, 0.95)}
+    innovations = ("accel_x",)
+    state = np.dtype([("count", float)])
+    step = staticmethod(_say)
+
+
+def test_a_compiled_step_writes_quantiles_and_innovations_online_and_in_one_loop():
+    samples = np.array([(0.5, 0.0), (0.7, 0.01)], [("accel_x", float), ("time", float)])
+    batch = Compiled().run({}, samples)
+    online = Compiled()
+    online.reset({}, 0.01)
+    for sample, expected in zip(samples, batch, strict=True):
+        assert online.update({name: sample[name] for name in samples.dtype.names}) == {
+            name: expected[name] for name in batch.dtype.names
+        }
+    assert batch.dtype.names == (
+        "mu_front", "mu_front_q05", "mu_front_q95", "accel_x_innovation",
+        "accel_x_innovation_variance",
+    )  # fmt: skip
+    assert batch[1].item() == pytest.approx((0.5, 0.3, 0.7, 0.7, 2.0))
+
+
+class Crossed(Compiled):
+    name = "crossed"
+    quantiles: ClassVar = {"mu_front": (0.05, 0.95)}
+
+    def reset(self, vehicle, dt):
+        pass
+
+    def run(self, vehicle, observations):
+        made = np.zeros(len(observations), self.record_types.est)
+        made["mu_front_q05"] = 1.0
+        return made
+
+
+def test_a_check_finds_quantiles_that_cross(short_scenario):
+    found = check_estimator(Crossed, [short_scenario], checks=["quantiles_in_order"])
+    assert "mu_front_q05 is above mu_front_q95 at t = 0 s" in found["quantiles_in_order"]
+    found = check_estimator(Compiled, [short_scenario], checks=["quantiles_in_order"])
+    assert found["quantiles_in_order"] == "PASSED"
+    found = check_estimator("slip_slope", [short_scenario], checks=["quantiles_in_order"])
+    assert found["quantiles_in_order"] == "SKIPPED: it declares no quantiles"

@@ -214,6 +214,39 @@ def test_variances_are_scored_and_a_nan_is_a_diverged_row(exported):
     assert "force_x_front is nan from t = 0.7 s" in {row.reason for row in rows}
 
 
+def test_quantiles_and_innovations_are_scored_and_what_cannot_be_is_refused(exported):
+    drives, results = exported
+    for folder in _folders(drives):
+        frame = _estimates(folder)
+        for level, offset in (("05", -500.0), ("50", 0.0), ("95", 500.0)):
+            frame[f"force_x_front_q{level}"] = frame["force_x_front"] + offset
+        frame["accel_x_innovation"] = np.arange(len(frame))
+        frame["accel_x_innovation_variance"] = 1.0
+        frame.to_csv(folder / "estimates.csv", index=False)
+    rows = submit(drives, "elsewhere", ["accel_x"], results)
+    for row in rows:
+        assert row.scores["force_x_front"]["sharpness"].value == pytest.approx(1000.0)
+        assert {"crps", "coverage_90", "mean_nees", "mean_nis"} <= set(row.scores["force_x_front"])
+    first, *others = sorted(_folders(drives))
+    last = first / "estimates.csv"
+    whole = pd.read_csv(last)
+    for change, message in (
+        ({"force_x_front_q95": -1e9}, "force_x_front_q50 is above force_x_front_q95 at t = 0 s"),
+        ({"force_x_front_variance": -1.0}, "which has a variance: state one of the two"),
+        ({"mu_q50": 1.0}, r"column 'mu_q50' \(Quantile of mu, level .50\) stands without"),
+    ):
+        whole.assign(**change).to_csv(last, index=False)
+        with pytest.raises(InputError, match=message):
+            submit(drives, "again", ["accel_x"], results)
+    whole[["time", "force_x_front"]].assign(force_x_front_variance=-1.0).to_csv(last, index=False)
+    for folder in others:
+        frame = pd.read_csv(folder / "estimates.csv")[["time", "force_x_front"]]
+        frame.assign(force_x_front_variance=1.0).to_csv(folder / "estimates.csv", index=False)
+    with pytest.raises(InputError, match=r"estimates.csv: force_x_front_variance is -1 at t = 0 s"):
+        submit(drives, "again", ["accel_x"], results)
+    assert "again" not in set(gripbench.read_rows(results)["label"])
+
+
 def test_a_drive_without_the_channels_needs_no_estimates_and_is_skipped(suite, tmp_path):
     folder = tmp_path / "mixed"
     folder.mkdir()

@@ -181,7 +181,9 @@ def _declaration(name: str, title: str, channels: tuple[str, ...], found: Estima
     for column in found.columns:
         if column != "time" and column not in outputs:
             plain = signal(column).description
-            raise InputError(f"{found.path}: column '{column}' ({plain}) stands alone")
+            raise InputError(
+                f"{found.path}: column '{column}' ({plain}) stands without its estimate"
+            )
     for column in outputs:
         if column not in found.columns:
             raise InputError(f"{found.path}: has no column '{column}'")

@@ -24,9 +24,9 @@ class SharedLibrary(ForeignMethod):
 
     `gripbench_start` gets the vehicle parameters and the settings in their declared order and the
     nominal time [s] between samples, and returns a new state, or NULL. `gripbench_update` gets the
-    declared channels in their order, `time` last (a channel that is missing is NaN), and writes the
-    estimates, then the variances; what it does not write keeps its last value, at first zero. It
-    returns 0, or a number of its own that ends the run. `gripbench_end` frees the state.
+    declared channels in their order, `time` last (a channel that is missing is NaN), and writes
+    what `outputs` names in this order; what it does not write keeps its last value, at first zero.
+    It returns 0, or a number of its own that ends the run. `gripbench_end` frees the state.
 
     Attributes
     ----------
