@@ -2,6 +2,7 @@
 
 import math
 from typing import ClassVar
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -11,7 +12,8 @@ import gripbench
 from gripbench.bench.catalogue.check import check_estimator
 from gripbench.bench.catalogue.declarations import declaration_from
 from gripbench.bench.command_line import application
-from gripbench.bench.publishing.leaderboard import build, read, write
+from gripbench.bench.publishing.leaderboard import build, read, uncertainty_boards, write
+from gripbench.bench.publishing.report.reliability import reliability_diagram
 from gripbench.bench.ranking.consistency import consistency
 from gripbench.bench.ranking.ranking import boards
 from gripbench.bench.scoring.consistency import CONSISTENT, SILENT
@@ -133,6 +135,23 @@ def test_the_leaderboard_keeps_the_boards_of_uncertainty_apart(rows, tmp_path):
     text = (tmp_path / "leaderboard.md").read_text()
     assert "overconfident by a factor" in text
     assert "Without a word on their errors" in text
+
+
+def test_the_report_draws_stated_against_observed_shares(rows):
+    (board,) = uncertainty_boards(rows)
+    drawing = ElementTree.fromstring(reliability_diagram(board))
+    curves = {line[0].text: line.attrib["points"] for line in drawing.iter("polyline")}
+    assert set(curves) == {
+        "constant_friction:prior", "prior", "prior:overconfident", "prior:cautious",
+        "in_quantiles", "watched",
+    }  # fmt: skip
+    points = [[float(x) for x in pair.split(",")] for pair in curves["prior"].split()]
+    (left, bottom), side = points[0], 280.0
+    line = board.lines.set_index("label").loc["prior"]
+    for (x, y), level in zip(points[1:], (50, 90, 95), strict=True):
+        assert (x - left) / side == pytest.approx(level / 100.0, abs=1e-3)
+        assert (bottom - y) / side == pytest.approx(line[f"coverage_{level}"], abs=1e-3)
+    assert uncertainty_boards(rows[rows["label"] == "silent"]) == []
 
 
 def command(*arguments):
