@@ -29,6 +29,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from gripbench.envs.vehicles import GRAVITY
+from gripbench.methods.blocks.course_history import wrapped
 from gripbench.methods.blocks.kalman import (
     correct,
     correct_scalar,
@@ -354,12 +355,6 @@ def heading_step(heading, obs, params):
         heading_update_field(
             heading, obs.magnetic_field_x, obs.magnetic_field_y, obs.magnetic_field_z, params
         )
-
-
-@compiled
-def wrapped(angle):
-    """Return an angle within -pi to pi [rad]."""
-    return angle - 2.0 * np.pi * np.round(angle / (2.0 * np.pi))
 
 
 @compiled

@@ -17,6 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from gripbench.envs.vehicles import GRAVITY
+from gripbench.methods.blocks.course_history import wrapped
 from gripbench.methods.contract import CompiledMethod, compiled
 from gripbench.methods.friction_ekf import (
     FRICTION_PARAMETERS,
@@ -36,7 +37,6 @@ from gripbench.methods.heading_ekf import (
     UNGATED,
     heading_step,
     unread_heading,
-    wrapped,
     yaw_speed,
 )
 from gripbench.methods.sideslip_kalman_filter import (

@@ -168,8 +168,7 @@ def declaration_of(
         If a declaration is missing or names a signal that does not exist.
     """
     compiled = isinstance(method, CompiledMethod)
-    module = sys.modules.get(type(method).__module__)
-    given = {item: getattr(method, item, None) for item in (*_TEXTS, *_NAMES)}
+    given = {item: getattr(method, item, None) for item in _READ}
     name = given["name"] if isinstance(given["name"], str) else type(method).__name__
     for function in ("reset", "update"):
         if not callable(getattr(method, function, None)):
@@ -177,18 +176,16 @@ def declaration_of(
     if compiled:
         check_names(f"{name}: 'parameters'", [item.name for item in method.parameters])
         check_names(f"{name}: 'variants'", list(method.variants))
-    given["variant"] = method.variant if compiled else variant
-    given["settings"] = dict(method.settings) if compiled else dict(parameters)
-    given["baseline"] = bool(getattr(method, "baseline", False))
-    given["files"] = getattr(method, "files", ())
-    given |= training_of(method)
-    given["quantiles"] = getattr(method, "quantiles", None)
-    given["file"] = str(getattr(module, "__file__", None) or "")
+    own = (method.variant, method.settings) if compiled else (variant, parameters)
+    given |= training_of(method) | {"variant": own[0], "settings": dict(own[1])}
+    given["file"] = str(getattr(sys.modules.get(type(method).__module__), "__file__", None) or "")
     return declaration_from(given, type(method).__name__)
 
 
-_TEXTS = ("name", "title", "reference")
-_NAMES = ("sensors", "estimates", "variances", "innovations", "vehicle_parameters")
+_READ = (
+    "name", "title", "reference", "sensors", "estimates", "variances", "quantiles", "innovations",
+    "vehicle_parameters", "files", "baseline",
+)  # fmt: skip
 
 LONGEST_NAME = 100
 """Largest number of characters of a name, which is also that of a file."""
@@ -246,7 +243,7 @@ def declaration_from(given: Mapping[str, Any], kind: str = "method") -> Declarat
         variant=variant,
         settings=dict(settings),
         file=str(given.get("file") or ""),
-        baseline=given.get("baseline") is True,
+        baseline=bool(given.get("baseline")),
         files=_files(given, name),
         **checked_training(given, name),
         quantiles=checked_quantiles(name, given.get("quantiles"), estimates, variances),
@@ -373,8 +370,7 @@ def _class_in(module: ModuleType, name: str, path: Path) -> Any:
         for key, value in vars(module).items()
         if inspect.isclass(value)
         and value.__module__ == module.__name__
-        and callable(getattr(value, "update", None))
-        and callable(getattr(value, "reset", None))
+        and all(callable(getattr(value, item, None)) for item in ("update", "reset"))
     }
     if name:
         if not hasattr(module, name):

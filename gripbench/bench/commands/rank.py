@@ -85,8 +85,9 @@ def show_boards(
     """Print boards with what each says in words; as CSV all of them in one table."""
     from textwrap import fill
 
-    from gripbench.bench.publishing.board_tables import board_table, one_table, wins_table
+    from gripbench.bench.publishing.board_tables import board_table, one_table
     from gripbench.bench.publishing.tables import show
+    from gripbench.bench.publishing.wins_table import wins_table
     from gripbench.bench.ranking.answers import words
 
     if format_ == "csv" and not wins:

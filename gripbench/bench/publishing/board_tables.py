@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from gripbench.bench.publishing.columns import Column, Table
-from gripbench.bench.publishing.consistency_table import uncertainty_columns
+from gripbench.bench.publishing.consistency_table import uncertainty_columns, uncertainty_note
 from gripbench.bench.publishing.timings import RelativeRuntime
 from gripbench.bench.ranking.answers import Answer
 from gripbench.bench.ranking.plans import plan_of
@@ -132,13 +132,7 @@ def _notes(board: Board, wide: bool) -> tuple[str, ...]:
         *board.notes,
     ]
     if not wide and board.by == "crps":
-        guess = f" Skill: 1 - score / score of {board.guess}." if board.guess else ""
-        notes.append(
-            "Score: of the mean continuous ranked probability score, for a stated distribution "
-            "that is narrow and true." + guess + " In 90 %: share of samples within the stated "
-            "90 % interval, and its width. A verdict's factor is on the standard deviation; n/a: "
-            "no distribution in every run."
-        )
+        notes.append(uncertainty_note(board))
     elif not wide:
         if board.guess:
             notes.append(
@@ -266,24 +260,6 @@ def one_table(boards: Sequence[Board], wide: bool = False) -> Table:
 
 def _count(number: int, thing: str) -> str:
     return f"{number} {thing}" + ("s" if number != 1 else "")
-
-
-def wins_table(board: Board) -> Table:
-    """Return the runs that the method of each row wins against that of each column."""
-    columns = [Column("name", "Wins against"), *(
-        Column(label, label, format="g") for label in board.wins.columns
-    )]  # fmt: skip
-    rows = [
-        {"name": label, **{str(other): value for other, value in line.items()}}
-        for label, line in board.wins.iterrows()
-    ]
-    runs = int(board.lines["cells"].iloc[0])
-    return Table(
-        tuple(columns),
-        tuple(rows),
-        caption=f"{board.title}: wins in {runs} runs",
-        notes=("Runs with the lower RMS, half for a draw; a failure loses.",),
-    )
 
 
 def _runtime_columns(relative: bool) -> list[Column]:

@@ -92,3 +92,14 @@ def uncertainty_columns(board: Board) -> tuple[Column, ...]:
         Column("sharpness", "Its width", unit, ".3g"),
         Column("uncertainty", "Verdict"),
     )
+
+
+def uncertainty_note(board: Board) -> str:
+    """Return what the columns of a board of uncertainty mean."""
+    guess = f" Skill: 1 - score / score of {board.guess}." if board.guess else ""
+    return (
+        "Score: of the mean continuous ranked probability score, for a stated distribution that "
+        f"is narrow and true.{guess} In 90 %: share of samples within the stated 90 % interval, "
+        "and its width. A verdict's factor is on the standard deviation; n/a: no distribution in "
+        "every run."
+    )
