@@ -30,6 +30,30 @@ def inlined(function: Callable[..., Any]) -> Any:
     return _njit(function, inline="always")
 
 
+def by_channels(choose: Callable[[tuple[str, ...]], Callable[..., Any]]) -> Callable[..., Any]:
+    """Make a function of state, observation and parameters that is another for other channels.
+
+    Parameters
+    ----------
+    choose
+        From the names of the observation's fields to a compiled function; in compiled callers it
+        is asked once, while they are compiled.
+    """
+
+    def function(state: Any, obs: Any, params: Any) -> Any:
+        return choose(obs.dtype.names)(state, obs, params)
+
+    if not _declare_only:
+        from numba.extending import overload
+
+        @overload(function)
+        def of_fields(state, obs, params):  # type: ignore[no-untyped-def]
+            chosen = choose(tuple(obs.fields))
+            return lambda state, obs, params: chosen(state, obs, params)
+
+    return function
+
+
 def _njit(function: Callable[..., Any], **options: Any) -> Any:
     if _declare_only:
         return function

@@ -11,10 +11,8 @@ from __future__ import annotations
 
 from math import log
 
-import numpy as np
-
+from gripbench.compilation import compiled
 from gripbench.methods.blocks.kalman import correct_scalar, filter_type
-from gripbench.methods.blocks.single_track import SINGLE_TRACK_VEHICLE
 from gripbench.methods.blocks.single_track_ekf import (
     correct_track,
     evaluate_track,
@@ -22,43 +20,30 @@ from gripbench.methods.blocks.single_track_ekf import (
 )
 from gripbench.methods.blocks.single_track_filter import (
     ADAPTIVE_PARAMETERS,
-    FUSED_SENSORS,
-    FUSED_VEHICLE,
-    GPS_SENSORS,
-    INPUT_STATE,
     LATERAL_ESTIMATES,
     LATERAL_INNOVATIONS,
     LATERAL_VARIANCES,
-    MEASURED_SENSORS,
-    read_fused,
-    read_gps,
-    read_measured,
+    SingleTrackFilter,
+    read_inputs,
     start_adaptive,
+    start_lateral,
+    track_state,
     write_friction,
     write_innovations,
     write_lateral,
     write_no_innovations,
 )
-from gripbench.methods.contract import CompiledMethod, Variant, compiled
-
-_STATE = np.dtype(
-    [
-        ("inputs", INPUT_STATE),
-        ("filter", filter_type(5)),  # states, with the parameters held as known
-        ("parameter", filter_type(3)),
-        ("motion", np.float64, (2, 7)),
-    ]
-)
 
 
 @compiled
-def _advance(state, obs, params, est):
+def _step(state, obs, params, est):
+    read_inputs(state.inputs, obs, params)
     filter, parameter, inputs = state.filter, state.parameter, state.inputs
     x, P, y, h = filter.x, filter.P, parameter.x, parameter.h
     span = obs.elapsed
     write_no_innovations(est)
     if obs.first:
-        P[0, 0], P[1, 1], x[1] = params.speed_y_std**2, 1.0, obs.yaw_rate
+        start_lateral(filter, obs, params)
         start_adaptive(y, parameter.P, 0, params)
         for i in range(3):
             x[2 + i] = y[i]
@@ -85,43 +70,15 @@ def _advance(state, obs, params, est):
     write_friction(y[2], parameter.P[2, 2], est)
 
 
-@compiled
-def _step(state, obs, params, est):
-    read_fused(state.inputs, obs, params)
-    _advance(state, obs, params, est)
-
-
-@compiled
-def _step_measured(state, obs, params, est):
-    read_measured(state.inputs, obs, params)
-    _advance(state, obs, params, est)
-
-
-@compiled
-def _step_gps(state, obs, params, est):
-    read_gps(state.inputs, obs, params)
-    _advance(state, obs, params, est)
-
-
-class DualEkf(CompiledMethod):
+class DualEkf(SingleTrackFilter):
     """A filter for the states beside one for stiffness and friction."""
 
     name = "dual_ekf"
     title = "Dual EKF"
     reference = "Wenzel, Burnham, Blundell & Williams (2006)"
-    sensors = FUSED_SENSORS
     estimates = (*LATERAL_ESTIMATES, "mu")
     variances = (*LATERAL_VARIANCES, "mu")
     innovations = LATERAL_INNOVATIONS
-    vehicle_parameters = FUSED_VEHICLE
     parameters = ADAPTIVE_PARAMETERS
-    variants = {
-        "measured_speed": Variant(
-            sensors=MEASURED_SENSORS, step=_step_measured, vehicle_parameters=SINGLE_TRACK_VEHICLE
-        ),
-        "gps_speed": Variant(
-            sensors=GPS_SENSORS, step=_step_gps, vehicle_parameters=SINGLE_TRACK_VEHICLE
-        ),
-    }
-    state = _STATE
+    state = track_state(5, ("parameter", filter_type(3)))  # five: parameters held as known
     step = staticmethod(_step)

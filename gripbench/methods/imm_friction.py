@@ -19,41 +19,27 @@ from gripbench.methods.blocks.hypotheses import (
     take,
     weigh,
 )
-from gripbench.methods.blocks.kalman import filter_type
-from gripbench.methods.blocks.single_track import SINGLE_TRACK_VEHICLE
 from gripbench.methods.blocks.single_track_ekf import correct_track, predict_track
 from gripbench.methods.blocks.single_track_filter import (
     FUSED_PARAMETERS,
-    FUSED_SENSORS,
-    FUSED_VEHICLE,
-    GPS_SENSORS,
-    INPUT_STATE,
     LATERAL_ESTIMATES,
     LATERAL_VARIANCES,
-    MEASURED_SENSORS,
-    read_fused,
-    read_gps,
-    read_measured,
+    SingleTrackFilter,
+    read_inputs,
+    track_state,
     write_lateral,
 )
-from gripbench.methods.contract import CompiledMethod, Parameter, Variant, compiled
+from gripbench.methods.contract import Parameter, compiled
 
 FRICTION = (0.15, 0.3, 0.55, 0.9)
 """Friction of ice, snow, wet and dry road."""
 
 _K = len(FRICTION)
-_STATE = np.dtype(
-    [
-        ("inputs", INPUT_STATE),
-        ("filter", filter_type(2)),
-        ("bank", bank_type(_K, 2)),
-        ("motion", np.float64, (2, 7)),
-    ]
-)
 
 
 @compiled
-def _advance(state, obs, params, est):
+def _step(state, obs, params, est):
+    read_inputs(state.inputs, obs, params)
     filter, inputs, bank = state.filter, state.inputs, state.bank
     span = obs.elapsed
     if obs.first:
@@ -85,46 +71,18 @@ def _advance(state, obs, params, est):
     est.mu_variance = square - mean * mean + params.class_error**2
 
 
-@compiled
-def _step(state, obs, params, est):
-    read_fused(state.inputs, obs, params)
-    _advance(state, obs, params, est)
-
-
-@compiled
-def _step_measured(state, obs, params, est):
-    read_measured(state.inputs, obs, params)
-    _advance(state, obs, params, est)
-
-
-@compiled
-def _step_gps(state, obs, params, est):
-    read_gps(state.inputs, obs, params)
-    _advance(state, obs, params, est)
-
-
-class ImmFriction(CompiledMethod):
+class ImmFriction(SingleTrackFilter):
     """Single-track filters on ice, snow, wet and dry road, weighed."""
 
     name = "imm_friction"
     title = "IMM over friction classes"
     reference = "Blom & Bar-Shalom (1988); Tsunashima, Murakami & Miyata (2006)"
-    sensors = FUSED_SENSORS
     estimates = (*LATERAL_ESTIMATES, "mu")
     variances = (*LATERAL_VARIANCES, "mu")
-    vehicle_parameters = FUSED_VEHICLE
     parameters = (
         *FUSED_PARAMETERS,
         Parameter("change_rate", 0.1, "1/s", "Rate at which the friction changes", 1e-4, 10.0),
         Parameter("class_error", 0.1, "-", "Error of a class's friction", 1e-3, 1.0),
     )
-    variants = {
-        "measured_speed": Variant(
-            sensors=MEASURED_SENSORS, step=_step_measured, vehicle_parameters=SINGLE_TRACK_VEHICLE
-        ),
-        "gps_speed": Variant(
-            sensors=GPS_SENSORS, step=_step_gps, vehicle_parameters=SINGLE_TRACK_VEHICLE
-        ),
-    }
-    state = _STATE
+    state = track_state(2, ("bank", bank_type(_K, 2)))
     step = staticmethod(_step)

@@ -18,19 +18,14 @@ from gripbench.methods.blocks.kalman import correct_scalar, filter_type, predict
 from gripbench.methods.blocks.single_track import SINGLE_TRACK_VEHICLE
 from gripbench.methods.blocks.single_track_filter import (
     FUSED_PARAMETERS,
-    FUSED_SENSORS,
     FUSED_VEHICLE,
-    GPS_SENSORS,
     INPUT_STATE,
-    LATERAL_ESTIMATES,
-    LATERAL_VARIANCES,
-    MEASURED_SENSORS,
-    read_fused,
-    read_gps,
-    read_measured,
+    SingleTrackFilter,
+    read_inputs,
+    speed_sources,
     write_lateral,
 )
-from gripbench.methods.contract import CompiledMethod, Parameter, Variant, compiled
+from gripbench.methods.contract import Parameter, compiled
 
 # the steady turn of the model knows no moment of inertia
 _VEHICLE = tuple(name for name in SINGLE_TRACK_VEHICLE if name != "yaw_inertia")
@@ -40,7 +35,8 @@ _STATE = np.dtype([("inputs", INPUT_STATE), ("filter", filter_type(2)), ("deviat
 
 
 @compiled
-def _advance(state, obs, params, est):
+def _step(state, obs, params, est):
+    read_inputs(state.inputs, obs, params)
     filter, inputs = state.filter, state.inputs
     x, P, h = filter.x, filter.P, filter.h
     span, speed, rate = obs.elapsed, inputs.speed, obs.yaw_rate
@@ -67,34 +63,14 @@ def _advance(state, obs, params, est):
     write_lateral(inputs, x[0], rate, P[0, 0], est)
 
 
-@compiled
-def _step(state, obs, params, est):
-    read_fused(state.inputs, obs, params)
-    _advance(state, obs, params, est)
-
-
-@compiled
-def _step_measured(state, obs, params, est):
-    read_measured(state.inputs, obs, params)
-    _advance(state, obs, params, est)
-
-
-@compiled
-def _step_gps(state, obs, params, est):
-    read_gps(state.inputs, obs, params)
-    _advance(state, obs, params, est)
-
-
-class KinematicObserver(CompiledMethod):
+class KinematicObserver(SingleTrackFilter):
     """Integrated lateral velocity, held near the model's where the model holds."""
 
     name = "kinematic_observer"
     title = "Kinematic observer, switched"
     reference = "Farrelly & Wellstead (1996); Ungoren, Peng & Tseng (2004)"
-    sensors = FUSED_SENSORS
-    estimates = LATERAL_ESTIMATES
-    variances = LATERAL_VARIANCES
     vehicle_parameters = _FUSED_VEHICLE
+    variants = speed_sources(_VEHICLE)
     parameters = (
         *FUSED_PARAMETERS,
         Parameter("pseudo_noise", 0.005, "rad sqrt(s)", "Density of the model's error", 1e-5, 1.0),
@@ -103,11 +79,5 @@ class KinematicObserver(CompiledMethod):
             "switch_time", 0.5, "s", "Time after which the model is trusted again", 0.01, 5.0
         ),
     )
-    variants = {
-        "measured_speed": Variant(
-            sensors=MEASURED_SENSORS, step=_step_measured, vehicle_parameters=_VEHICLE
-        ),
-        "gps_speed": Variant(sensors=GPS_SENSORS, step=_step_gps, vehicle_parameters=_VEHICLE),
-    }
     state = _STATE
     step = staticmethod(_step)

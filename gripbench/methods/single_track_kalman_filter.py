@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gripbench.compilation import compiled
 from gripbench.methods.blocks.discretisation import exponential
 from gripbench.methods.blocks.kalman import (
     correct_scalar,
@@ -21,24 +22,14 @@ from gripbench.methods.blocks.kalman import (
     innovation_variance,
     predict_covariance,
 )
-from gripbench.methods.blocks.single_track import SINGLE_TRACK_VEHICLE
 from gripbench.methods.blocks.single_track_filter import (
-    FUSED_PARAMETERS,
-    FUSED_SENSORS,
-    FUSED_VEHICLE,
-    GPS_SENSORS,
     INPUT_STATE,
-    LATERAL_ESTIMATES,
     LATERAL_INNOVATIONS,
-    LATERAL_VARIANCES,
-    MEASURED_SENSORS,
-    read_fused,
-    read_gps,
-    read_measured,
+    SingleTrackFilter,
+    read_inputs,
     write_lateral,
     write_no_innovations,
 )
-from gripbench.methods.contract import CompiledMethod, Variant, compiled
 
 _STATE = np.dtype(
     [
@@ -68,7 +59,8 @@ def linear_model(model, speed, params):
 
 
 @compiled
-def _advance(state, obs, params, est):
+def _step(state, obs, params, est):
+    read_inputs(state.inputs, obs, params)
     filter, inputs = state.filter, state.inputs
     x, P, h = filter.x, filter.P, filter.h
     elapsed, speed = obs.elapsed, inputs.speed
@@ -113,43 +105,12 @@ def _advance(state, obs, params, est):
     write_lateral(inputs, x[0], x[1], P[0, 0], est)
 
 
-@compiled
-def _step(state, obs, params, est):
-    read_fused(state.inputs, obs, params)
-    _advance(state, obs, params, est)
-
-
-@compiled
-def _step_measured(state, obs, params, est):
-    read_measured(state.inputs, obs, params)
-    _advance(state, obs, params, est)
-
-
-@compiled
-def _step_gps(state, obs, params, est):
-    read_gps(state.inputs, obs, params)
-    _advance(state, obs, params, est)
-
-
-class SingleTrackKalmanFilter(CompiledMethod):
+class SingleTrackKalmanFilter(SingleTrackFilter):
     """Linear single-track model corrected by yaw rate and lateral acceleration."""
 
     name = "single_track_kalman_filter"
     title = "Single-track Kalman filter"
     reference = "Rajamani, Vehicle Dynamics and Control, 2.3; Best, Gordon & Dixon (2000)"
-    sensors = FUSED_SENSORS
-    estimates = LATERAL_ESTIMATES
-    variances = LATERAL_VARIANCES
     innovations = LATERAL_INNOVATIONS
-    vehicle_parameters = FUSED_VEHICLE
-    parameters = FUSED_PARAMETERS
-    variants = {
-        "measured_speed": Variant(
-            sensors=MEASURED_SENSORS, step=_step_measured, vehicle_parameters=SINGLE_TRACK_VEHICLE
-        ),
-        "gps_speed": Variant(
-            sensors=GPS_SENSORS, step=_step_gps, vehicle_parameters=SINGLE_TRACK_VEHICLE
-        ),
-    }
     state = _STATE
     step = staticmethod(_step)

@@ -1,16 +1,19 @@
 """Speed, steering, yaw rate and a_y in, lateral velocity out: what the single-track filters share.
 
-The speed comes from the fusion of production sensors or from a channel that measures it; readings
-that are missing are held as inputs and left out as measurements.
+The speed comes from the fusion of production sensors or from a channel that measures it (variants
+`measured_speed` and `gps_speed`, which share the step); readings that are missing are held as
+inputs and left out as measurements.
 """
 
 from __future__ import annotations
 
 from math import atan2, exp, log
+from typing import Any
 
 import numpy as np
 
-from gripbench.compilation import compiled
+from gripbench.compilation import by_channels, compiled
+from gripbench.methods.blocks.kalman import filter_type
 from gripbench.methods.blocks.single_track import LOWEST_SPEED, SINGLE_TRACK_VEHICLE
 from gripbench.methods.blocks.speed_fusion import (
     SPEED_PARAMETERS,
@@ -19,7 +22,8 @@ from gripbench.methods.blocks.speed_fusion import (
     SPEED_VEHICLE,
     advance_speed,
 )
-from gripbench.methods.settings import Parameter
+from gripbench.methods.contract import CompiledMethod
+from gripbench.methods.settings import Parameter, Variant
 
 FUSED_SENSORS = (*SPEED_SENSORS, "accel_y")
 MEASURED_SENSORS = ("speed_x", "steer_angle", "yaw_rate", "accel_y")
@@ -39,6 +43,10 @@ INPUT_STATE = np.dtype(
     ]
 )
 """Inputs of a single-track filter: the last that were there."""
+
+LATERAL_ESTIMATES = ("sideslip", "speed_y", "yaw_rate")
+LATERAL_VARIANCES = ("sideslip", "speed_y")
+LATERAL_INNOVATIONS = ("yaw_rate", "accel_y")
 
 NOISE_PARAMETERS = (
     Parameter("speed_y_walk", 0.3, "m/s^2/sqrt(Hz)", "Noise density of d v_y/dt", 1e-4, 10.0),
@@ -63,22 +71,29 @@ ADAPTIVE_PARAMETERS = (
 
 
 @compiled
-def read_fused(inputs, obs, params):
-    """Read the inputs of a sample; the speed is fused from production sensors."""
+def _read_fused(inputs, obs, params):
     advance_speed(inputs.fusion, obs, params, inputs.speed_y)
     _read(inputs, inputs.fusion.filter.x[0], obs)
 
 
 @compiled
-def read_measured(inputs, obs, params):
-    """Read the inputs of a sample; the speed is the channel `speed_x`."""
+def _read_measured(inputs, obs, params):
     _read(inputs, obs.speed_x, obs)
 
 
 @compiled
-def read_gps(inputs, obs, params):
-    """Read the inputs of a sample; the speed is the channel `speed_gps`."""
+def _read_gps(inputs, obs, params):
     _read(inputs, obs.speed_gps, obs)
+
+
+def _reading(channels: tuple[str, ...]) -> Any:
+    if "speed_x" in channels:
+        return _read_measured
+    return _read_gps if "speed_gps" in channels else _read_fused
+
+
+read_inputs = by_channels(_reading)
+"""Read the inputs of a sample into a record of `INPUT_STATE`, the speed from whatever gives it."""
 
 
 @compiled
@@ -92,6 +107,13 @@ def _read(inputs, speed, obs):
         inputs.steer = obs.steer_angle
     if obs.first:
         inputs.last_steer = inputs.steer
+
+
+@compiled
+def start_lateral(filter, obs, params):
+    """Set v_y, of which nothing is known, and the yaw rate at the first sample."""
+    filter.P[0, 0], filter.P[1, 1] = params.speed_y_std**2, 1.0
+    filter.x[1] = obs.yaw_rate
 
 
 @compiled
@@ -121,11 +143,6 @@ def write_innovations(rate, accel, est):
     est.accel_y_innovation_variance, est.accel_y_innovation = accel[1], accel[2]
 
 
-LATERAL_ESTIMATES = ("sideslip", "speed_y", "yaw_rate")
-LATERAL_VARIANCES = ("sideslip", "speed_y")
-LATERAL_INNOVATIONS = ("yaw_rate", "accel_y")
-
-
 @compiled
 def start_adaptive(x, P, first, params):
     """Set ln C_f, ln C_r and ln mu, from state `first` on."""
@@ -140,3 +157,36 @@ def write_friction(logarithm, variance, est):
     spread = min(variance, 1.0)
     est.mu = exp(min(logarithm + 0.5 * spread, 0.5))
     est.mu_variance = est.mu * est.mu * (exp(spread) - 1.0)
+
+
+def track_state(states: int, *others: tuple[Any, ...]) -> np.dtype[Any]:
+    """Return the state of a filter on the single-track model with brush tyres.
+
+    Parameters
+    ----------
+    states
+        Number of states of its extended Kalman filter.
+    *others
+        Further fields.
+    """
+    filter = ("filter", filter_type(states))
+    return np.dtype([("inputs", INPUT_STATE), filter, ("motion", np.float64, (2, 7)), *others])
+
+
+def speed_sources(vehicle: tuple[str, ...]) -> dict[str, Variant]:
+    """Return the variants by what measures the speed, for a method that needs these parameters."""
+    return {
+        "measured_speed": Variant(sensors=MEASURED_SENSORS, vehicle_parameters=vehicle),
+        "gps_speed": Variant(sensors=GPS_SENSORS, vehicle_parameters=vehicle),
+    }
+
+
+class SingleTrackFilter(CompiledMethod):
+    """Declaration of a filter on the single-track model; a subclass adds name, state and step."""
+
+    sensors = FUSED_SENSORS
+    estimates = LATERAL_ESTIMATES
+    variances = LATERAL_VARIANCES
+    vehicle_parameters = FUSED_VEHICLE
+    parameters = FUSED_PARAMETERS
+    variants = speed_sources(SINGLE_TRACK_VEHICLE)
