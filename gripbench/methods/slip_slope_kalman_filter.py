@@ -27,7 +27,6 @@ import numpy as np
 
 from gripbench.methods.blocks.axle_friction import (
     AXLE_LOAD_PARAMETERS,
-    TYRE_PARAMETERS,
     front_load,
     rear_load,
 )
@@ -133,7 +132,13 @@ class SlipSlopeKalmanFilter(CompiledMethod):
     sensors = ("wheel_speed_front", "wheel_speed_rear", "torque_front", "torque_rear")
     estimates = ("mu_front", "mu_rear")
     variances = ("mu_front", "mu_rear")
-    vehicle_parameters = (*AXLE_LOAD_PARAMETERS, *TYRE_PARAMETERS, "wheel_radius", "wheel_inertia")
+    vehicle_parameters = (
+        *AXLE_LOAD_PARAMETERS,
+        "magic_b",
+        "magic_c",
+        "wheel_radius",
+        "wheel_inertia",
+    )
     parameters = (
         Parameter("friction_mean", 0.75, "-", "Mean of the friction before the drive", 0.1, 1.2),
         Parameter("friction_spread", 0.25, "-", "Its standard deviation", 0.02, 1.0),
