@@ -52,6 +52,7 @@ FLOORS = (
     (
         "bench.publishing.columns",
         "bench.publishing.tables",
+        "bench.publishing.terminal",
         "bench.publishing.latex",
         "bench.publishing.figures",
         "bench.publishing.manifest",

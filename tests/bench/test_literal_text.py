@@ -4,7 +4,7 @@ import pytest
 from rich.table import Table
 
 from gripbench.bench.publishing import tables
-from gripbench.bench.publishing.presentation import console
+from gripbench.bench.publishing.terminal import console
 
 WORDS = [
     "[rad]",
@@ -36,6 +36,8 @@ def test_a_published_table_prints_as_it_is(words, capsys):
     table = tables.Table(
         (tables.Column("a", words),), ({"a": words},), caption=words, notes=(words,)
     )
-    console().print(tables.terminal(table))
     escaped = words.replace("\n", "\\n").replace("\x1b", "\\x1b")
+    tables.show(table)
     assert capsys.readouterr().out.count(escaped) == 4
+    console().print(tables.terminal(table))
+    assert capsys.readouterr().out.count(escaped) == 2

@@ -8,6 +8,7 @@ import synthetic_rows
 from rich.console import Console
 
 from gripbench.bench.publishing import presentation
+from gripbench.bench.publishing.tables import plain, terminal
 from gripbench.bench.ranking.summary import summary
 from gripbench.bench.running.rows import frame_of
 
@@ -15,12 +16,14 @@ SCENARIOS = tuple(f"a_scenario_with_a_long_name_{k}" for k in range(9))
 
 
 def text_of(rows, width=120):
-    console = Console(width=width, record=True, highlight=False, force_terminal=False)
+    found = presentation.rms_tables(summary(frame_of(rows)), width)
+    console = Console(width=width, highlight=False, force_terminal=False)
     with console.capture() as captured:
-        for heading, table in presentation.rms_tables(summary(frame_of(rows)), width):
-            console.print(heading, markup=False, soft_wrap=True)
-            console.print(table)
-    return captured.get()
+        for table in found:
+            console.print(terminal(table))
+    assert "…" not in captured.get()
+    assert max(map(len, captured.get().splitlines())) <= width
+    return "".join(map(plain, found))
 
 
 def rows_of(target, scenarios, **more):

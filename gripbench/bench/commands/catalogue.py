@@ -52,7 +52,7 @@ def show(
 ) -> None:
     """Show the full settings of whatever has this name, as JSON."""
     from gripbench.bench.catalogue.listing import settings
-    from gripbench.bench.publishing.presentation import console
+    from gripbench.bench.publishing.terminal import console
 
     console().print_json(json.dumps(settings(name)))
 
@@ -71,14 +71,12 @@ def methods_table(
 
 def _print(header: Sequence[str], lines: Iterable[Sequence[str]]) -> None:
     """Print a table, and below it what its mark means where it has one."""
-    from rich.table import Table
-
-    from gripbench.bench.publishing.presentation import console
+    from gripbench.bench.publishing.columns import Table
+    from gripbench.bench.publishing.tables import show
+    from gripbench.bench.publishing.terminal import console
     from gripbench.bench.ranking.summary import FOOTNOTE, MARK
 
-    table = Table(*header)
-    for line in lines:
-        table.add_row(*line)
-    console().print(table)
-    if any(MARK in text for line in lines for text in line):
+    found = list(lines)
+    show(Table.of_texts(header, found))
+    if any(MARK in text for line in found for text in line):
         console().print(FOOTNOTE)

@@ -49,7 +49,7 @@ def check(
 ) -> None:
     """Check a method against everything that the benchmark expects of one."""
     from gripbench.bench.catalogue.check import check_estimator, failures, tally
-    from gripbench.bench.publishing.presentation import console
+    from gripbench.bench.publishing.terminal import console
     from gripbench.bench.running.api import limits_of
     from gripbench.bench.running.check_records import keep_record
     from gripbench.bench.running.isolation.processes import choose_sandbox
@@ -87,7 +87,7 @@ def new_method(
 ) -> None:
     """Write a small working method with its test."""
     from gripbench.bench.catalogue.templates import write_method
-    from gripbench.bench.publishing.presentation import console
+    from gripbench.bench.publishing.terminal import console
 
     method, test = write_method(name, folder, compiled)
     class_name = "".join(part.capitalize() for part in name.split("_"))

@@ -26,7 +26,7 @@ def evidence(
     from gripbench.bench.papers.li2014 import evidence as li2014
     from gripbench.bench.papers.li2014.tables import load_paper_tables
     from gripbench.bench.publishing import tables
-    from gripbench.bench.publishing.presentation import progress
+    from gripbench.bench.publishing.terminal import progress
     from gripbench.errors import unknown
 
     if paper not in PAPERS:

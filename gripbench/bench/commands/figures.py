@@ -26,7 +26,7 @@ def figures(
 ) -> None:
     """Draw a paper's result figures by number, as PNG and PDF, into RESULTS/PAPER/figures."""
     from gripbench.bench.papers.figures import choose, write_figures
-    from gripbench.bench.publishing.presentation import progress
+    from gripbench.bench.publishing.terminal import progress
 
     wanted = figure or []
     directory = results / paper / "figures"

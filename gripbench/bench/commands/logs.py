@@ -249,23 +249,17 @@ def identify(
 
 
 def _print_inspection(log: Path, database: Sequence[str]) -> None:
-    from rich.table import Table
-
-    from gripbench.bench.publishing.presentation import console
+    from gripbench.bench.publishing.columns import Table
+    from gripbench.bench.publishing.tables import show
     from gripbench.logs.mapping.inspection import inspect_log
 
     inspection = inspect_log(log, database)
-    table = Table("column", "unit", "samples", "blank", "lowest", "highest")
-    for column in inspection.columns:
-        table.add_row(
-            column.name,
-            column.unit,
-            str(column.samples),
-            str(column.blanks),
-            column.low,
-            column.high,
-        )
-    console(stderr=True).print(table)
+    headings = ("column", "unit", "samples", "blank", "lowest", "highest")
+    lines = [
+        (one.name, one.unit, str(one.samples), str(one.blanks), one.low, one.high)
+        for one in inspection.columns
+    ]
+    show(Table.of_texts(headings, lines), stderr=True)
     for note in (*inspection.notes, *_what_would_run(log, inspection.proposal)):
         print(f"note: {note}", file=sys.stderr)
     print(inspection.proposal, end="")

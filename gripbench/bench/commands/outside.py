@@ -36,7 +36,7 @@ def export(
     ] = DEFAULT_RESULTS,
 ) -> None:
     """Write a suite's observations for an estimator that runs elsewhere; never the truth."""
-    from gripbench.bench.publishing.presentation import console, progress
+    from gripbench.bench.publishing.terminal import console, progress
     from gripbench.bench.running.api import seeds_of
     from gripbench.bench.running.exporting import export_suite
     from gripbench.envs.scenarios import LEVELS
@@ -68,7 +68,8 @@ def submit(
     results: Annotated[Path, typer.Option(help="Folder of the stored rows.")] = DEFAULT_RESULTS,
 ) -> None:
     """Score estimates that were computed elsewhere, as rows beside all others."""
-    from gripbench.bench.publishing.presentation import console, print_failures, print_summary
+    from gripbench.bench.publishing.presentation import print_failures, print_summary
+    from gripbench.bench.publishing.terminal import console
     from gripbench.bench.ranking.summary import summary
     from gripbench.bench.running import submissions
     from gripbench.bench.running.rows import frame_of

@@ -45,8 +45,8 @@ def report(
     ] = None,
 ) -> None:
     """Write a self-contained HTML report of the stored results; it opens from disk, offline."""
-    from gripbench.bench.publishing.presentation import progress
     from gripbench.bench.publishing.report.page import write_report
+    from gripbench.bench.publishing.terminal import progress
     from gripbench.bench.running.backends import Backend
     from gripbench.writing import check_writable
 

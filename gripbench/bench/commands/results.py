@@ -26,33 +26,37 @@ def register(app: typer.Typer) -> None:
 
 def list_rows(results: Results = DEFAULT_RESULTS) -> None:
     """List the stored rows by scenario and method."""
-    from rich.table import Table
-
-    from gripbench.bench.publishing.presentation import console
+    from gripbench.bench.publishing.columns import Table
+    from gripbench.bench.publishing.tables import show as show_table
+    from gripbench.bench.publishing.terminal import console
     from gripbench.bench.running.store import read_rows
 
     frame = read_rows(results).drop_duplicates(["scenario", "label", "seed"])
     if frame.empty:
         console().print(f"no rows under {results}")
         return
-    table = Table("scenario", "method", "rows", "seeds", "status")
-    for (scenario, label), group in frame.groupby(["scenario", "label"], sort=False):
-        counts = group["status"].value_counts().sort_index()
-        table.add_row(
+    lines = [
+        (
             str(scenario),
             str(label),
             str(len(group)),
             f"{group['seed'].min()} to {group['seed'].max()}",
-            ", ".join(f"{count} {status}" for status, count in counts.items()),
+            ", ".join(
+                f"{count} {status}"
+                for status, count in group["status"].value_counts().sort_index().items()
+            ),
         )
-    console().print(table)
+        for (scenario, label), group in frame.groupby(["scenario", "label"], sort=False)
+    ]
+    show_table(Table.of_texts(("scenario", "method", "rows", "seeds", "status"), lines))
 
 
 def show(
     results: Results = DEFAULT_RESULTS, scenario: Scenarios = None, method: Methods = None
 ) -> None:
     """Show the RMS errors of stored rows, and what failed."""
-    from gripbench.bench.publishing.presentation import console, print_failures, print_summary
+    from gripbench.bench.publishing.presentation import print_failures, print_summary
+    from gripbench.bench.publishing.terminal import console
     from gripbench.bench.ranking.summary import summary
     from gripbench.bench.running.store import read_rows
 
@@ -71,7 +75,7 @@ def prune(
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would go.")] = False,
 ) -> None:
     """Remove the rows of a scenario or method, or what is damaged or of unknown scenarios."""
-    from gripbench.bench.publishing.presentation import console
+    from gripbench.bench.publishing.terminal import console
     from gripbench.bench.running.pruning import remove, stale, stored
 
     if scenario or method:

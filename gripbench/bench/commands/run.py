@@ -103,13 +103,9 @@ def run(
     """Run methods on scenarios and print their RMS errors; what is stored is not run again."""
     from gripbench.bench.catalogue.suites import load_suite
     from gripbench.bench.publishing.degradation_table import degradation_tables, every_line
-    from gripbench.bench.publishing.presentation import (
-        console,
-        print_failures,
-        print_summary,
-        progress,
-    )
+    from gripbench.bench.publishing.presentation import print_failures, print_summary
     from gripbench.bench.publishing.tables import show
+    from gripbench.bench.publishing.terminal import console, progress
     from gripbench.bench.ranking.degradation import degradation, without_faults
     from gripbench.bench.ranking.log_windows import scored_windows
     from gripbench.bench.ranking.summary import scores_csv, summary

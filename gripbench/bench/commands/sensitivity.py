@@ -49,8 +49,8 @@ def sensitivity(
     from gripbench.bench.publishing.figures.breaking import breaking_map
     from gripbench.bench.publishing.figures.style import save, style
     from gripbench.bench.publishing.figures.tornado import tornado
-    from gripbench.bench.publishing.presentation import console
     from gripbench.bench.publishing.tables import show
+    from gripbench.bench.publishing.terminal import console
     from gripbench.bench.ranking import sensitivity as study
     from gripbench.bench.running.api import seeds_of
     from gripbench.bench.running.fitting import fitted

@@ -18,7 +18,7 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 
-from gripbench.errors import InputError, nearest
+from gripbench.errors import InputError, nearest, one_line
 
 MISSING = "–"
 """What a renderer shows where there is no value; CSV leaves the cell empty."""
@@ -44,6 +44,8 @@ class Column:
     tied
         Name of a boolean in each row that says whether its value shares the best one's mark;
         empty: those that read the same as the best.
+    right
+        Whether its texts stand at the right, as numbers do.
     """
 
     key: str
@@ -52,6 +54,7 @@ class Column:
     format: str = ""
     best: Literal["", "lowest", "highest"] = ""
     tied: str = ""
+    right: bool = False
 
     @property
     def heading(self) -> str:
@@ -77,6 +80,8 @@ class Table:
     group_by
         Key of a column: consecutive rows with the same value form a group; the best is sought
         within each group and a rule divides them. Empty: one group.
+    headed
+        Whether that value stands above its group on a terminal, instead of in a column.
 
     Raises
     ------
@@ -89,6 +94,7 @@ class Table:
     caption: str = ""
     notes: tuple[str, ...] = ()
     group_by: str = ""
+    headed: bool = False
     _groups: tuple[range, ...] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -117,13 +123,22 @@ class Table:
         rows = tuple({str(k): v for k, v in row.items()} for row in frame.to_dict("records"))
         return cls(tuple(columns), rows, caption, tuple(notes), group_by)
 
+    @classmethod
+    def of_texts(
+        cls, headings: Sequence[str], lines: Iterable[Sequence[str]], caption: str = ""
+    ) -> Table:
+        """Return a table of texts as they are, by its headings and lines."""
+        keys = list(map(str, range(len(headings))))
+        columns = tuple(Column(key, heading) for key, heading in zip(keys, headings, strict=True))
+        return cls(columns, tuple(dict(zip(keys, line, strict=True)) for line in lines), caption)
+
     @property
     def groups(self) -> tuple[range, ...]:
         """Indices of the rows of each group."""
         return self._groups
 
     def text(self, row: int, column: Column) -> str:
-        """Return a cell as shown, `MISSING` where there is no value."""
+        """Return a cell as shown, on one line; `MISSING` where there is no value."""
         value = self.rows[row][column.key]
         if is_missing(value):
             return MISSING
@@ -131,7 +146,7 @@ class Table:
             return "yes" if value else "no"
         if isinstance(value, numbers.Real):
             return _without_exponent(format(value, column.format), float(value))
-        return str(value)
+        return one_line(str(value))
 
     def best(self) -> frozenset[tuple[int, str]]:
         """Return the cells that are best, as (index of the row, key of the column)."""
@@ -182,3 +197,8 @@ def is_numeric(table: Table, column: Column) -> bool:
     """Return whether a column holds numbers only; an empty one counts by its format."""
     values = [row[column.key] for row in table.rows if not is_missing(row[column.key])]
     return all(map(is_number, values)) if values else bool(column.format)
+
+
+def is_right(table: Table, column: Column) -> bool:
+    """Return whether a column stands at the right."""
+    return column.right or is_numeric(table, column)

@@ -18,9 +18,11 @@ import pandas as pd
 from pydantic import Field
 
 from gripbench.bench.publishing.columns import Column, Table
+from gripbench.bench.publishing.figures.style import series_style
 from gripbench.bench.publishing.leaderboard import Leaderboard, Runs
 from gripbench.bench.scoring.metric import pooled_rms
 from gripbench.configuration import Configuration, parse
+from gripbench.envs.signals import signal
 from gripbench.errors import InputError
 from gripbench.writing import write_atomically
 
@@ -243,10 +245,16 @@ def table_of(frame: pd.DataFrame) -> Table:
         Column("ranks", "Rank"),
         Column("geometric_rms", "RMS (geometric mean)", format=".4g"),
         Column("rms", "RMS (pooled)", format=".4g"),
+        Column("unit", "Unit"),
         Column("relative_runtime", "Step", "reference kernels", ".3g"),
         Column("failures", "Failed", format="d"),
     )
+    signals = [signal(target) for target in frame["target"]]
+    factors = [one.display_factor for one in signals]
     shown = frame.assign(
+        geometric_rms=frame["geometric_rms"] * factors,
+        rms=frame["rms"] * factors,
+        unit=[one.display_unit for one in signals],
         commit=[
             name[:8] + ("+" if modified else "")
             for name, modified in zip(frame["commit"], frame["modified"], strict=True)
@@ -277,8 +285,6 @@ def plot(frame: pd.DataFrame) -> Figure:
     """
     from matplotlib.figure import Figure  # without pyplot: no window, no global state
 
-    from gripbench.envs.signals import signal
-
     if frame.empty:
         raise InputError("the history is empty; 'gripbench history add' adds to it")
     targets = list(dict.fromkeys(sorted(frame["target"])))
@@ -289,10 +295,10 @@ def plot(frame: pd.DataFrame) -> Figure:
     figure = Figure(figsize=(8.0, 0.8 + 2.4 * panels), layout="constrained")
     axes = figure.subplots(panels, 1, squeeze=False, sharex=True)[:, 0]
     for axis, target in zip(axes, targets, strict=False):
-        unit = signal(target).unit
+        unit, factor = signal(target).display_unit, signal(target).display_factor
         title = f"RMS of {target}" + (f" [{unit}]" if unit != "-" else "")
         part = frame[frame["target"] == target]
-        _lines(axis, part, "geometric_rms", places, labels, title)
+        _lines(axis, part, "geometric_rms", places, labels, title, factor)
     if timed:
         once = frame.drop_duplicates(["commit", "label"])
         _lines(axes[-1], once, "relative_runtime", places, labels, "step [reference kernels]")
@@ -303,11 +309,6 @@ def plot(frame: pd.DataFrame) -> Figure:
     return figure
 
 
-# Okabe and Ito's colours, told apart by the colour-blind; markers tell them apart in grey
-_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-_MARKERS = "os^vDPX*<>"
-
-
 def _lines(
     axis: Any,
     frame: pd.DataFrame,
@@ -315,18 +316,21 @@ def _lines(
     places: Mapping[str, int],
     labels: Sequence[str],
     title: str,
+    factor: float = 1.0,
 ) -> None:
     """Draw one line a method; a method looks the same in every panel."""
     from matplotlib.ticker import LogFormatter
 
     for number, label in enumerate(labels):
         part = frame[(frame["label"] == label) & frame[column].notna()]
+        look = series_style(number)
         axis.plot(
             [places[name] for name in part["commit"]],
-            part[column],
+            factor * part[column],
             label=label,
-            color=_COLOURS[number % len(_COLOURS)],
-            marker=_MARKERS[number % len(_MARKERS)],
+            color=look.color,
+            linestyle=look.linestyle,
+            marker=look.marker,
             markersize=4,
             linewidth=1,
         )

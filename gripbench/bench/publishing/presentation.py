@@ -1,17 +1,14 @@
-"""How results look on a terminal: tables with intervals, and progress that can be silent."""
+"""A summary of rows in; its tables on a terminal out, with intervals and what failed."""
 
 from __future__ import annotations
 
 import math
-import sys
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING
 
-from rich.box import SIMPLE_HEAD
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-from rich.table import Table
-from rich.text import Text
-
+from gripbench.bench.publishing.columns import Column, Table
+from gripbench.bench.publishing.tables import show, width_of
+from gripbench.bench.publishing.terminal import console
 from gripbench.bench.ranking.summary import (
     FOOTNOTE,
     MARKED_BY,
@@ -21,48 +18,9 @@ from gripbench.bench.ranking.summary import (
     training_note,
 )
 from gripbench.envs.signals import signal
-from gripbench.errors import one_line
 
 if TYPE_CHECKING:
     import pandas as pd
-
-
-class _LiteralConsole(Console):
-    """A console on which a text is its letters: no markup, no emoji, no control characters."""
-
-    def render_str(self, text: str, **options: Any) -> Text:
-        """Return a text, whatever it holds, on one line."""
-        return super().render_str(one_line(text), **options)
-
-
-def console(stderr: bool = False) -> Console:
-    """Return the console for texts and tables; wide where no terminal sets a width.
-
-    Names, reasons and notes come from outside: here alone they become letters on a line.
-    """
-    stream = sys.stderr if stderr else sys.stdout
-    return _LiteralConsole(
-        stderr=stderr,
-        width=None if stream.isatty() else 200,
-        highlight=False,
-        markup=False,
-        emoji=False,
-    )
-
-
-def progress(description: str, total: int) -> Progress:
-    """Return a progress bar on standard error, silent where that is no terminal."""
-    bar = Progress(
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        console=Console(stderr=True),
-        disable=not sys.stderr.isatty(),
-        transient=True,
-    )
-    bar.add_task(description, total=total)
-    return bar
 
 
 def significant(value: float, digits: int = 3) -> str:
@@ -122,112 +80,111 @@ def cell(line: pd.Series, factor: float = 1.0) -> str:
     return " ".join(parts)
 
 
-def rms_tables(summary: pd.DataFrame, width: int) -> list[tuple[str, Table]]:
-    """Return headings and tables of each target.
+def rms_tables(summary: pd.DataFrame, width: int) -> list[Table]:
+    """Return the tables of each target.
 
     Methods down and scenarios across where that fits the width; else, and for a friction with a
     response to excitation, one line a method in a block for each scenario.
     """
-    tables = []
+    found = []
     for key, part in summary.groupby("target", sort=False):
         target = str(key)
         if not target:
             continue
         factor, unit = signal(target).display_factor, signal(target).display_unit
         runs = int(part["runs"].max())
-        heading = f"{target} [{unit}]: RMS error"
-        heading += f", pooled over {runs} runs, 95 % interval" if runs > 1 else ", one run"
+        caption = f"{target} [{unit}]: RMS error"
+        caption += f", pooled over {runs} runs, 95 % interval" if runs > 1 else ", one run"
         responds = bool((part["excited"].fillna(0) > 0).any())
-        table = _across(part, factor)
-        if responds or Console(width=10_000).measure(table).maximum > width:
-            table = _down(part, factor, responds)
+        table = _across(part, factor, caption)
         if responds:
-            heading += "; delay until it stays within 20 %"
-        tables.append((heading, table))
+            table = _down(part, factor, f"{caption}; delay until it stays within 20 %", _response)
+        elif width_of(table) > width:
+            table = _down(part, factor, caption)
+        found.append(table)
         if (part["jumps"].fillna(0) > 0).any():
-            tables.append(
-                (f"{target}: delay [s] from the jump of the friction, 95 % interval", _jumps(part))
-            )
-    return tables
+            found.append(_jumps(part, target))
+    return found
 
 
-def _across(part: pd.DataFrame, factor: float) -> Table:
+def _across(part: pd.DataFrame, factor: float, caption: str) -> Table:
     """Return a table with methods down and scenarios across."""
     scenarios = list(dict.fromkeys(part["scenario"]))
-    table = Table()
-    table.add_column("method", no_wrap=True)
-    for scenario in scenarios:
-        table.add_column(scenario, justify="right", no_wrap=True)
-    for label, lines in part.groupby("label", sort=False):
-        texts = {line["scenario"]: cell(line, factor) for _, line in lines.iterrows()}
-        name = marked(str(label), *lines[[*MARKED_BY]].iloc[0])
-        table.add_row(name, *(texts.get(scenario, "") for scenario in scenarios))
-    return table
+    rows = [
+        {"method": _name(lines.iloc[0]), **dict.fromkeys(scenarios, "")}
+        | {line["scenario"]: cell(line, factor) for _, line in lines.iterrows()}
+        for _, lines in part.groupby("label", sort=False)
+    ]
+    columns = [Column("method", "method"), *(Column(name, name, right=True) for name in scenarios)]
+    return Table(tuple(columns), tuple(rows), caption)
 
 
-def _down(part: pd.DataFrame, factor: float, responds: bool) -> Table:
+def _down(
+    part: pd.DataFrame,
+    factor: float,
+    caption: str,
+    more: Callable[[pd.Series, float], Mapping[str, str]] = lambda line, factor: {},
+) -> Table:
     """Return a table with a block for each scenario; what was skipped altogether is left out."""
-    table = _blocks()
-    table.add_column("scenario, method", no_wrap=True)
-    headings = ("RMS", *(("from excitation", "delay [s]", "settled") if responds else ()))
-    for heading in headings:
-        table.add_column(heading, justify="right")
-    for scenario, lines in part.groupby("scenario", sort=False):
-        shown = [line for _, line in lines.iterrows() if not _skipped(line)]
-        if not shown:
-            continue
-        table.add_section()
-        table.add_row(Text(one_line(str(scenario)), "bold"))
-        for line in shown:
-            name = marked(line["label"], *line[[*MARKED_BY]])
-            more = _response(line, factor) if responds else ()
-            table.add_row(f"  {name}", cell(line, factor), *more)
-    return table
+    rows = [
+        {"scenario": scenario, "method": _name(line), "RMS": cell(line, factor)}
+        | more(line, factor)
+        for scenario, lines in part.groupby("scenario", sort=False)
+        for _, line in lines.iterrows()
+        if not _skipped(line)
+    ]
+    return _blocks(rows, caption)
 
 
-def _blocks() -> Table:
-    """Return an empty table without vertical lines: five columns stay within 120 characters."""
-    return Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False, show_edge=False)
+def _blocks(rows: Sequence[Mapping[str, str]], caption: str) -> Table:
+    titles = {"method": "scenario, method"}
+    columns = tuple(
+        Column(key, titles.get(key, key), right=key not in ("scenario", "method"))
+        for key in (rows[0] if rows else ("scenario", "method"))
+    )
+    return Table(columns, tuple(rows), caption, group_by="scenario", headed=True)
+
+
+def _name(line: pd.Series) -> str:
+    return marked(str(line["label"]), *line[[*MARKED_BY]])
 
 
 def _skipped(line: pd.Series) -> bool:
     return bool(not line["ok"] and line["status"] == f"{line['runs']} skipped")
 
 
-def _response(line: pd.Series, factor: float) -> tuple[str, str, str]:
+def _response(line: pd.Series, factor: float) -> dict[str, str]:
     """Return RMS from the first excitation on, delay, and how many of the excited runs settle."""
     if not line["excited"] > 0:
-        return "not excited", "", ""
-    return (
-        bounded(line["excited_rms"], line["excited_low"], line["excited_high"], factor),
-        seconds(line["delay"], line["delay_low"], line["delay_high"]),
-        f"{line['settled']:.0f}/{line['excited']:.0f}",
-    )
+        return {"from excitation": "not excited", "delay [s]": "", "settled": ""}
+    excited = line["excited_rms"], line["excited_low"], line["excited_high"]
+    return {
+        "from excitation": bounded(*excited, factor),
+        "delay [s]": seconds(line["delay"], line["delay_low"], line["delay_high"]),
+        "settled": f"{line['settled']:.0f}/{line['excited']:.0f}",
+    }
 
 
-def _jumps(part: pd.DataFrame) -> Table:
-    table = _blocks()
-    table.add_column("scenario, method", no_wrap=True)
-    table.add_column("delay [s]", justify="right")
-    table.add_column("settled", justify="right")
-    for scenario, lines in part[part["jumps"].fillna(0) > 0].groupby("scenario", sort=False):
-        table.add_section()
-        table.add_row(Text(one_line(str(scenario)), "bold"))
-        for _, line in lines.iterrows():
-            table.add_row(
-                f"  {marked(line['label'], *line[[*MARKED_BY]])}",
-                seconds(line["jump_delay"], line["jump_low"], line["jump_high"]),
-                f"{line['jump_settled']:.0f}/{line['jumps']:.0f}",
-            )
-    return table
+def _jumps(part: pd.DataFrame, target: str) -> Table:
+    rows = [
+        {
+            "scenario": scenario,
+            "method": _name(line),
+            "delay [s]": seconds(line["jump_delay"], line["jump_low"], line["jump_high"]),
+            "settled": f"{line['jump_settled']:.0f}/{line['jumps']:.0f}",
+        }
+        for scenario, lines in part[part["jumps"].fillna(0) > 0].groupby("scenario", sort=False)
+        for _, line in lines.iterrows()
+    ]
+    return _blocks(rows, f"{target}: delay [s] from the jump of the friction, 95 % interval")
 
 
 def print_summary(summary: pd.DataFrame) -> None:
     """Print the tables of a summary, and what the mark means where it occurs."""
     out = console()
-    for heading, table in rms_tables(summary, out.width):
-        out.print(heading, markup=False, soft_wrap=True)
-        out.print(table)
+    for table in rms_tables(summary, out.width):
+        show(table)
+        print()
     if (summary["idealised"] != "").any():
         out.print(FOOTNOTE)
     if summary["computed_outside"].any():

@@ -11,6 +11,7 @@ import html as html_format
 import io
 import numbers
 import re
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -26,36 +27,32 @@ from gripbench.bench.publishing.columns import (
     Table,
     is_missing,
     is_number,
-    is_numeric,
+    is_right,
 )
 from gripbench.bench.publishing.latex import latex_line, latex_number, latex_text
+from gripbench.bench.publishing.terminal import console
 from gripbench.errors import one_line, unknown
 
 
 def terminal(table: Table) -> rich.table.Table:
-    """Return a table that rich prints."""
-    shown = rich.table.Table(
-        box=rich.box.SIMPLE_HEAD,
-        title=rich.text.Text(one_line(table.caption)) if table.caption else None,
-        caption=rich.text.Text("\n".join(map(one_line, table.notes))) if table.notes else None,
-        title_justify="left",
-        caption_justify="left",
-    )
-    for column in table.columns:
+    """Return the columns and rows of a table as rich prints them."""
+    shown = rich.table.Table(box=rich.box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
+    columns = _on_terminal(table)
+    for column in columns:
+        right = is_right(table, column)
         shown.add_column(
             rich.text.Text(one_line(column.heading)),
-            justify="right" if is_numeric(table, column) else "left",
-            no_wrap=is_numeric(table, column),
+            justify="right" if right else "left",
+            no_wrap=right,
         )
     best = table.best()
     for group in table.groups:
+        if table.headed:
+            shown.add_row(rich.text.Text(_heading(table, group), "bold"))
         for row in group:
             cells = [
-                rich.text.Text(
-                    one_line(table.text(row, column)),
-                    style="bold" if (row, column.key) in best else "",
-                )
-                for column in table.columns
+                rich.text.Text(text, "bold" if (row, column.key) in best else "")
+                for text, column in zip(_cells(table, row, columns), columns, strict=True)
             ]
             shown.add_row(*cells, end_section=row == group[-1])
     return shown
@@ -64,29 +61,48 @@ def terminal(table: Table) -> rich.table.Table:
 def plain(table: Table) -> str:
     """Return what the terminal shows as plain text at its natural width, `*` behind the best."""
     best = table.best()
-    cells = [[column.heading for column in table.columns]]
-    for row in range(len(table.rows)):
-        cells.append(
-            [
-                table.text(row, column) + ("*" if (row, column.key) in best else "")
-                for column in table.columns
-            ]
-        )
-    widths = [max(len(line[j]) for line in cells) for j in range(len(table.columns))]
-    right = [is_numeric(table, column) for column in table.columns]
-    lines = [
+    columns = _on_terminal(table)
+    lines = [[one_line(column.heading) for column in columns]]
+    for group in table.groups:
+        if table.headed:
+            lines.append([_heading(table, group)])
+        for row in group:
+            texts = zip(_cells(table, row, columns), columns, strict=True)
+            lines.append([text + ("*" if (row, c.key) in best else "") for text, c in texts])
+    whole = [line for line in lines if len(line) == len(columns)]
+    widths = [max(len(line[j]) for line in whole) for j in range(len(columns))]
+    right = [is_right(table, column) for column in columns]
+    shown = [
         "  ".join(
-            text.rjust(width) if numeric else text.ljust(width)
-            for text, width, numeric in zip(line, widths, right, strict=True)
+            text.rjust(width) if stands else text.ljust(width)
+            for text, width, stands in zip(line, widths, right, strict=False)
         ).rstrip()
-        for line in cells
+        for line in lines
     ]
-    lines.insert(1, "  ".join("-" * width for width in widths))
-    head = [table.caption, ""] if table.caption else []
+    shown.insert(1, "  ".join("-" * width for width in widths))
+    head = [one_line(table.caption), ""] if table.caption else []
     within = "group" if len(table.groups) > 1 else "column"
-    notes = [*([f"* best of its {within}"] if best else []), *table.notes]
+    notes = [*([f"* best of its {within}"] if best else []), *map(one_line, table.notes)]
     tail = ["", *notes] if notes else []
-    return "\n".join([*head, *lines, *tail]) + "\n"
+    return "\n".join([*head, *shown, *tail]) + "\n"
+
+
+def width_of(table: Table) -> int:
+    """Return the number of columns of a terminal that a table takes."""
+    return Console(width=10_000).measure(terminal(table)).maximum
+
+
+def _on_terminal(table: Table) -> tuple[Column, ...]:
+    return tuple(c for c in table.columns if not (table.headed and c.key == table.group_by))
+
+
+def _heading(table: Table, group: range) -> str:
+    return one_line(str(table.rows[group[0]][table.group_by]))
+
+
+def _cells(table: Table, row: int, columns: tuple[Column, ...]) -> list[str]:
+    texts = [table.text(row, column) for column in columns]
+    return [f"  {texts[0]}", *texts[1:]] if table.headed else texts
 
 
 def markdown(table: Table) -> str:
@@ -95,7 +111,7 @@ def markdown(table: Table) -> str:
     lines = [
         "| " + " | ".join(_markdown(column.heading) for column in table.columns) + " |",
         "|"
-        + "|".join("---:" if is_numeric(table, column) else "---" for column in table.columns)
+        + "|".join("---:" if is_right(table, column) else "---" for column in table.columns)
         + "|",
     ]
     for row in range(len(table.rows)):
@@ -131,7 +147,7 @@ def latex(table: Table, standalone: bool = False) -> str:
         `\usepackage{booktabs}` where it is included.
     """
     best = table.best()
-    alignment = "".join("r" if is_numeric(table, column) else "l" for column in table.columns)
+    alignment = "".join("r" if is_right(table, column) else "l" for column in table.columns)
     lines = [r"\begin{table}[htbp]", r"\centering"]
     if table.caption:
         lines.append(rf"\caption{{{latex_text(table.caption)}}}")
@@ -176,7 +192,7 @@ def html(table: Table) -> str:
         lines.append(f"<caption>{html_format.escape(table.caption)}</caption>")
     lines.append("<thead><tr>")
     for column in table.columns:
-        name = "number" if is_numeric(table, column) else "text"
+        name = "number" if is_right(table, column) else "text"
         heading = html_format.escape(column.heading)
         lines.append(f'<th scope="col" class="{name}" data-key="{column.key}">{heading}</th>')
     lines.append("</tr></thead>")
@@ -222,7 +238,7 @@ def render(table: Table, format_name: str) -> str:
     return FORMATS[format_name](table)
 
 
-def show(table: Table, format_name: str = "terminal") -> None:
+def show(table: Table, format_name: str = "terminal", stderr: bool = False) -> None:
     """Print a table: with rich on a terminal, else in one of `FORMATS`.
 
     Raises
@@ -235,11 +251,15 @@ def show(table: Table, format_name: str = "terminal") -> None:
     if format_name != "terminal":
         print(render(table, format_name), end="")
         return
-    console = Console()
-    if console.is_terminal:
-        console.print(terminal(table))
-    else:
-        print(plain(table), end="")
+    out = console(stderr)
+    if not out.is_terminal:
+        print(plain(table), end="", file=sys.stderr if stderr else sys.stdout)
+        return
+    if table.caption:
+        out.print(table.caption, soft_wrap=True)
+    out.print(terminal(table))
+    for note in table.notes:
+        out.print(note)
 
 
 def format_of(path: Path) -> str:
@@ -274,7 +294,7 @@ def _html_cell(table: Table, row: int, column: Column, best: bool) -> str:
     value = table.rows[row][column.key]
     text = html_format.escape(table.text(row, column))
     attributes = f' data-key="{html_format.escape(column.key)}"'
-    if is_numeric(table, column):
+    if is_right(table, column):
         names = "number best" if best else "number"
         attributes += f' class="{names}"'
     if is_number(value):

@@ -25,7 +25,13 @@ from gripbench.bench.papers.figures import PaperFigure
 from gripbench.bench.papers.panels import Panel, draw_panels, signal_panel
 from gripbench.bench.papers.sideslip import steady
 from gripbench.bench.publishing.figures.runs import Runs
-from gripbench.bench.publishing.figures.style import TRUTH, line, new_figure, series_style
+from gripbench.bench.publishing.figures.style import (
+    TRUTH,
+    line,
+    new_figure,
+    series_style,
+    zero_line,
+)
 from gripbench.envs.recordings import Recording
 from gripbench.envs.vehicles import GRAVITY, load_vehicle
 from gripbench.envs.worlds import load_scenario, record
@@ -170,7 +176,7 @@ def _residuals(runs: Runs, scenario: str, updated: bool = False) -> Figure:
             color=series_style(index).color,
             linewidth=0.6,
         )
-        axes.axhline(0.0, color="#000000", linewidth=0.8)
+        zero_line(axes)
     rows[0].set_ylabel("Residual of the\nyaw rate [°/s]")
     rows[1].set_ylabel("Residual of the\nGPS course [°]")
     rows[1].set_xlabel("Time [s]")

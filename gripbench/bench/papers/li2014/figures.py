@@ -20,6 +20,7 @@ from gripbench.bench.papers.figures import PaperFigure
 from gripbench.bench.papers.li2014.tables import PaperTables, load_paper_tables
 from gripbench.bench.publishing.figures.runs import Runs
 from gripbench.bench.publishing.figures.style import (
+    SHADE,
     TRUTH,
     axis_label,
     legend_above,
@@ -190,7 +191,7 @@ def _with_detail(runs: Runs, scenario: str, name: str) -> Figure:
         drawn.set_linewidth(0.5 * drawn.get_linewidth())
     detail.set_ylabel("")
     detail.set_xlim(*DETAIL)
-    whole.axvspan(*DETAIL, color="#999999", alpha=0.5, zorder=0)
+    whole.axvspan(*DETAIL, color=SHADE, alpha=0.5, zorder=0)
     time = runs.recording(scenario).truth["time"]
     _fit(detail, (time >= DETAIL[0]) & (time <= DETAIL[1]))
     _fit(whole, time > SETTLED)

@@ -20,7 +20,7 @@ from gripbench.bench.papers.yoon2015.brush_identification import (
 )
 from gripbench.bench.papers.yoon2015.reproduction import TRACK, friction_error_and_delay
 from gripbench.bench.publishing.figures.runs import Runs
-from gripbench.bench.publishing.figures.style import new_figure, series_style
+from gripbench.bench.publishing.figures.style import SHADE, new_figure, series_style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -80,7 +80,7 @@ def _performance(runs: Runs) -> Figure:
             markerfacecolor="white", markersize=7.0, label=label,
         )  # fmt: skip
     axes.fill_between(
-        (1.0, 7.0), 0.0, 0.2, color="#bbbbbb", alpha=0.4, linewidth=0.0, label="Range in the paper"
+        (1.0, 7.0), 0.0, 0.2, color=SHADE, alpha=0.25, linewidth=0.0, label="Range in the paper"
     )
     axes.margins(0.05)
     axes.set(xlabel="Tracking delay [s]", ylabel="Normalised steady-state error")

@@ -16,6 +16,7 @@ from gripbench.bench.publishing.figures.style import (
     line,
     new_figure,
     series_style,
+    zero_line,
 )
 from gripbench.bench.running.recorded_scenarios import log_window
 from gripbench.envs.signals import VARIANCE, difference, signal
@@ -125,7 +126,7 @@ def run_plot(
     rows[0].set_ylabel(axis_label(name))
     rows[-1].set_xlabel("Time [s]" if window is None else "Time of the log [s]")
     if methods:
-        rows[1].axhline(0.0, color="#000000", linewidth=0.8)
+        zero_line(rows[1])
         rows[1].set_ylabel("Error" if unit == "-" else f"Error [{unit}]")
     legend_above(rows[0], 2 if max(map(len, methods), default=0) > 24 else 3)
     title = f"{scenario}, seed {seed}"

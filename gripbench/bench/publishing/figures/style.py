@@ -78,6 +78,18 @@ SERIES = (
 """Styles of the estimates, in the order in which a picture draws them."""
 
 
+SHADE = "#999999"
+"""Colour of a range that is pointed out behind the curves."""
+
+PAGE: Mapping[str, tuple[str, ...]] = {
+    "light": tuple(look.color for look in SERIES),
+    "dark": ("#56B4E9", "#FF8A4C", "#2FCB9A", "#E79BC8", "#F2C04D", "#B7A4FF"),
+    "dashes": ("dash", "dot", "dashdot", "longdash", "solid", "longdashdot"),
+    "symbols": ("circle", "square", "triangle-up", "diamond", "triangle-down", "cross"),
+}
+"""The same in Plotly's words, with colours for a dark page."""
+
+
 def series_style(index: int) -> SeriesStyle:
     """Return the style of the series with this index; they repeat from the seventh on."""
     return SERIES[index % len(SERIES)]
@@ -135,6 +147,11 @@ def line(
         markeredgewidth=1.0,
         zorder=3 if look is TRUTH else 3.5,
     )
+
+
+def zero_line(axes: Axes) -> None:
+    """Draw where an error is zero."""
+    axes.axhline(0.0, color=TRUTH.color, linewidth=0.8)
 
 
 def _markers(x: npt.NDArray[np.float64], offset: float) -> list[int]:

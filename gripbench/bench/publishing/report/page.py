@@ -1,10 +1,8 @@
-"""The page: content, style, script and Plotly in one HTML file."""
+"""Rows and time series in; content, style, script and Plotly in one HTML file out."""
 
 from __future__ import annotations
 
-import html
 import json
-import re
 from collections.abc import Callable, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
@@ -14,15 +12,13 @@ import pandas as pd
 
 import gripbench
 from gripbench.bench.catalogue.registry import choose_method
-from gripbench.bench.publishing import tables
 from gripbench.bench.publishing.board_tables import answer_table
-from gripbench.bench.publishing.columns import Table
 from gripbench.bench.publishing.degradation_table import degradation_tables, every_line
-from gripbench.bench.publishing.figures.style import SERIES
+from gripbench.bench.publishing.figures.style import PAGE
 from gripbench.bench.publishing.leaderboard import uncertainty_boards
 from gripbench.bench.publishing.manifest import commit
+from gripbench.bench.publishing.pages import template
 from gripbench.bench.publishing.report.content import (
-    PaperResult,
     chosen_targets,
     failure_table,
     found_boards,
@@ -48,10 +44,6 @@ from gripbench.bench.running.recorded_scenarios import PREFIX, at_hand, recorded
 from gripbench.bench.running.store import read_rows
 from gripbench.errors import InputError
 from gripbench.writing import write_atomically
-
-_DARK = ("#56B4E9", "#FF8A4C", "#2FCB9A", "#E79BC8", "#F2C04D", "#B7A4FF")
-_DASHES = ("dash", "dot", "dashdot", "longdash", "solid", "longdashdot")
-_SYMBOLS = ("circle", "square", "triangle-up", "diamond", "triangle-down", "cross")
 
 
 def write_report(
@@ -182,31 +174,59 @@ def page(
         "fronts": {target: points for target, board in whole.items() if (points := front(board))},
         "profiles": {target: profile(board) for target, board in whole.items()},
         "series": series,
-        "style": {
-            "light": [look.color for look in SERIES],
-            "dark": list(_DARK),
-            "dashes": list(_DASHES),
-            "symbols": list(_SYMBOLS),
+        "style": PAGE,
+    }
+    return template(Path(__file__).parent, "template.html").render(
+        css=_file("report.css"),
+        script=_file("report.js"),
+        plotly=_plotly(),
+        data=_json(data),
+        answers=answer_table(answers(rows, targets)),
+        facts=_facts(rows),
+        targets=targets,
+        boards=[_Shown(board) for board in found],
+        critical=[critical_differences(board) for board in whole.values()],
+        faults=degradation_tables(damage) if len(damage) else [],
+        every_fault=[every_line(damage, str(name)) for name in damage["target"].unique()]
+        if len(damage)
+        else [],
+        uncertainty=[_Stated(board) for board in _of_uncertainty(rows, targets)],
+        papers=paper_results(results),
+        failures=failure_table(rows),
+        absent=absent,
+        manifests={
+            name: json.dumps(content, indent=1, sort_keys=True)
+            for name, content in manifests(results).items()
         },
-    }
-    parts = {
-        "css": _file("report.css"),
-        "answers": _answers(rows, targets),
-        "summary": _summary(rows, targets),
-        "boards": "\n".join(_board(board) for board in found),
-        "critical": "\n".join(critical_differences(board) for board in whole.values()),
-        "faults": _faults(damage),
-        "uncertainty": _uncertainty(rows, targets),
-        "papers": _papers(paper_results(results)),
-        "failures": _failures(rows) + _notes(absent),
-        "manifest": _manifest(manifests(results)),
-        "footer": html.escape(f"gripbench {gripbench.__version__}, commit {commit()}, {today()}"),
-        "points": str(POINTS),
-        "data": _json(data),
-        "script": _file("report.js"),
-        "plotly": _plotly(),
-    }
-    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], _file("template.html"))
+        footer=f"gripbench {gripbench.__version__}, commit {commit()}, {today()}",
+        points=POINTS,
+    )
+
+
+class _Shown:
+    """A board as the page shows it: its answer, its tables, the choice by which it is found."""
+
+    def __init__(self, board: Board) -> None:
+        self.title, self.target = board.title, board.target
+        self.said, self.narrow, self.wide = shown_board(board)
+        first = board.scenarios[:1]
+        marks = [text for name in first for text in (plan_of(name), setting_of(name)) if text]
+        sensors = ", ".join(board.sensors) or "any"
+        self.choice = f"{sensors} ({', '.join(marks)})" if marks else sensors
+
+
+class _Stated:
+    """A board of uncertainty as the page shows it: its answer, its table, what is stated and seen."""
+
+    def __init__(self, board: Board) -> None:
+        setting = setting_of(board.scenarios[0]) if board.scenarios else ""
+        self.title = board.title + (f", {setting}" if setting else "")
+        self.said, self.narrow, _ = shown_board(board)
+        self.diagram = reliability_diagram(board)
+
+
+def _of_uncertainty(rows: pd.DataFrame, targets: Sequence[str]) -> list[Board]:
+    return sorted(uncertainty_boards(rows[rows["target"].isin(targets)]), key=standing_of)
 
 
 def _file(name: str) -> str:
@@ -228,11 +248,11 @@ def _json(value: Any) -> str:
     return text.replace("<", "\\u003c")
 
 
-def _summary(rows: pd.DataFrame, targets: Sequence[str]) -> str:
+def _facts(rows: pd.DataFrame) -> dict[str, str]:
     runs = rows.drop_duplicates(["scenario", "label", "seed"])
     status = runs["status"].value_counts()
     bad = {str(name): int(count) for name, count in status.items() if name != "ok"}
-    facts = {
+    return {
         "Scenarios": str(runs["scenario"].nunique()),
         "Methods": str(runs["label"].nunique()),
         "Seeds": str(runs["seed"].nunique()),
@@ -240,136 +260,3 @@ def _summary(rows: pd.DataFrame, targets: Sequence[str]) -> str:
         "Finished": str(int(status.get("ok", 0))),
         "Not finished": ", ".join(f"{count} {name}" for name, count in bad.items()) or "none",
     }
-    items = "".join(
-        f"<div><dt>{html.escape(name)}</dt><dd>{html.escape(value)}</dd></div>"
-        for name, value in facts.items()
-    )
-    names = ", ".join(html.escape(name) for name in targets)
-    return (
-        f'<dl class="facts">{items}</dl>\n'
-        "<p>Every method ran over the same recordings of the same seeds, and was given the "
-        f"sensors that it declares and nothing else. Targets: {names}.</p>"
-    )
-
-
-def _board(board: Any) -> str:
-    sensors = ", ".join(board.sensors) or "any"
-    plan = plan_of(board.scenarios[0]) if board.scenarios else ""
-    setting = setting_of(board.scenarios[0]) if board.scenarios else ""
-    marks = ", ".join(text for text in (plan, setting) if text)
-    choice = f"{sensors} ({marks})" if marks else sensors
-    said, narrow, wide = shown_board(board)
-    title = html.escape(board.title)
-    return (
-        f'<div class="board" data-target="{html.escape(board.target)}" '
-        f'data-sensors="{html.escape(choice)}">\n<p class="answer">{html.escape(said)}</p>\n'
-        f'<div class="narrow scroll" tabindex="0" role="region" aria-label="{title}">\n'
-        f"{tables.html(narrow)}</div>\n<details><summary>Every column</summary>"
-        f'<div class="scroll" tabindex="0" role="region" aria-label="{title}, every column">\n'
-        f"{tables.html(wide)}</div></details></div>"
-    )
-
-
-def _uncertainty(rows: pd.DataFrame, targets: Sequence[str]) -> str:
-    """Return the boards of uncertainty with their reliability diagrams."""
-    found = uncertainty_boards(rows[rows["target"].isin(targets)])
-    found.sort(key=standing_of)
-    if not found:
-        return "<p>No method here states how large its errors are.</p>"
-    parts = []
-    for board in found:
-        setting = setting_of(board.scenarios[0]) if board.scenarios else ""
-        title = html.escape(board.title + (f", {setting}" if setting else ""))
-        said, narrow, _ = shown_board(board)
-        parts.append(
-            f"<details><summary>{title}</summary>"
-            f'<p class="answer">{html.escape(said)}</p>'
-            f'<div class="scroll" tabindex="0" role="region" aria-label="{title}">'
-            f"{tables.html(narrow)}</div>{reliability_diagram(board)}</details>"
-        )
-    return "\n".join(parts)
-
-
-def _answers(rows: pd.DataFrame, targets: Sequence[str]) -> str:
-    found = tables.html(answer_table(answers(rows, targets)))
-    return (
-        '<div class="scroll" tabindex="0" role="region" '
-        f'aria-label="Which method for which road and sensors">\n{found}</div>'
-    )
-
-
-def _faults(damage: pd.DataFrame) -> str:
-    if damage.empty:
-        return (
-            "<p>No run with a fault lies in this results folder: "
-            "<code>gripbench run --suite lateral_population --faults</code> makes them.</p>"
-        )
-    parts = [_scrolled(table) for table in degradation_tables(damage)]
-    for target in damage["target"].unique():
-        table = every_line(damage, str(target))
-        summary = html.escape(table.caption)
-        parts.append(f"<details><summary>{summary}</summary>{_scrolled(table)}</details>")
-    return "\n".join(parts)
-
-
-def _scrolled(table: Table) -> str:
-    return (
-        f'<div class="scroll" tabindex="0" role="region" aria-label="{html.escape(table.caption)}">'
-        f"\n{tables.html(table)}</div>"
-    )
-
-
-def _papers(found: Sequence[PaperResult]) -> str:
-    if not found:
-        return (
-            "<p>No reproduction of a paper lies in this results folder: "
-            "<code>gripbench reproduce li2014</code> makes one.</p>"
-        )
-    parts = [
-        '<p class="caption">Figures that a paper prints, beside what gripbench obtains. Green: '
-        "within the tolerance stated with the paper's file; orange: not.</p>"
-    ]
-    for paper in found:
-        parts.append(f"<h3>{html.escape(paper.name)}</h3>")
-        if paper.remarks:
-            lines = "".join(f"<li>{html.escape(line)}</li>" for line in paper.remarks)
-            parts.append(f"<ul>{lines}</ul>")
-        for item in paper.tables:
-            parts.append(
-                f"<details><summary>{html.escape(item.title)}</summary>"
-                f'<div class="papers scroll" tabindex="0" role="region" '
-                f'aria-label="{html.escape(f"{paper.name} {item.title}")}">'
-                f"{tables.html(item.table)}</div></details>"
-            )
-    return "\n".join(parts)
-
-
-def _failures(rows: pd.DataFrame) -> str:
-    table = failure_table(rows)
-    if not table.rows:
-        return "<p>Every run finished.</p>"
-    return (
-        '<p class="caption">What did not end well and why. A failure ranks last; a skipped run '
-        "lacks a sensor or a vehicle parameter that the method needs.</p>"
-        '<div class="scroll" tabindex="0" role="region" aria-label="Failures">'
-        f"{tables.html(table)}</div>"
-    )
-
-
-def _notes(absent: Mapping[str, str]) -> str:
-    """Return what was not run at all, say for want of a recording's files: no method failed."""
-    return "".join(
-        f'<p class="note">Note: {html.escape(scenario)} was not run: {html.escape(reason)}.</p>'
-        for scenario, reason in absent.items()
-    )
-
-
-def _manifest(found: Mapping[str, Any]) -> str:
-    if not found:
-        return "<p>No manifest lies in this results folder.</p>"
-    return "\n".join(
-        f"<details><summary>{html.escape(name)}</summary>"
-        f'<pre tabindex="0">{html.escape(json.dumps(content, indent=1, sort_keys=True))}</pre>'
-        "</details>"
-        for name, content in found.items()
-    )
