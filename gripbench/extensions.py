@@ -12,6 +12,9 @@ Groups: `gripbench.methods`, `gripbench.scenarios`, `gripbench.metrics`, `gripbe
 from __future__ import annotations
 
 import importlib.metadata
+import os
+import sys
+from functools import lru_cache
 from typing import Any
 
 from gripbench.errors import InputError
@@ -19,8 +22,22 @@ from gripbench.errors import InputError
 
 def entry_points(group: str) -> dict[str, importlib.metadata.EntryPoint]:
     """Return the entry points of a group that installed packages declare, by name."""
-    points = importlib.metadata.entry_points(group=group)
+    places = tuple((place, _changed(place)) for place in sys.path)
+    points = _every_point(places).select(group=group)
     return {point.name: point for point in sorted(points, key=lambda point: point.name)}
+
+
+@lru_cache(maxsize=1)
+def _every_point(places: tuple[tuple[str, int], ...]) -> importlib.metadata.EntryPoints:
+    del places  # the cache's key: a package may come while a notebook runs
+    return importlib.metadata.entry_points()
+
+
+def _changed(place: str) -> int:
+    try:
+        return os.stat(place or ".").st_mtime_ns
+    except OSError:
+        return 0
 
 
 def load(point: importlib.metadata.EntryPoint, kind: type | tuple[type, ...] = object) -> Any:

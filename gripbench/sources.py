@@ -13,7 +13,7 @@ import importlib.metadata
 import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 
 import gripbench
@@ -23,15 +23,20 @@ _PROJECT = Path(gripbench.__file__).resolve().parent
 
 @dataclass(frozen=True)
 class _File:
+    path: Path
     changed: int
     size: int
-    digest: str
+
+    @cached_property
+    def digest(self) -> str:
+        """Digest of the content; empty where the file has changed before anybody asked."""
+        content = hashlib.sha256(self.path.read_bytes()).hexdigest()
+        return content if _file(self.path) == self else ""
 
 
 def _file(path: Path) -> _File:
     about = path.stat()
-    content = hashlib.sha256(path.read_bytes()).hexdigest()
-    return _File(about.st_mtime_ns, about.st_size, content)
+    return _File(path, about.st_mtime_ns, about.st_size)
 
 
 _AT_START = {path: _file(path) for path in _PROJECT.rglob("*.py")}
@@ -42,10 +47,8 @@ def changed_since_start() -> Path | None:
     """Return a file of gripbench that is not what this process runs; None: all are."""
     for path, before in _AT_START.items():
         try:
-            about = path.stat()
-            if (about.st_mtime_ns, about.st_size) == (before.changed, before.size):
-                continue
-            if _file(path).digest != before.digest:
+            now = _file(path)
+            if now != before and now.digest != before.digest:
                 return path
         except OSError:
             return path

@@ -21,6 +21,9 @@ from gripbench.errors import InputError
 STANDARD_OUTPUT = Path("-")
 """The path that means standard output."""
 
+DEFAULT_RESULTS = Path("results")
+"""Folder of everything that commands write, unless they are told another."""
+
 
 def write_atomically(path: Path, content: str | bytes) -> None:
     """Write a file in one atomic step, and its folder where there is none.

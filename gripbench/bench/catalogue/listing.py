@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from gripbench.bench.catalogue.registry import built_in_methods, choose_method, method_names
-from gripbench.bench.catalogue.scenarios import all_scenario_files, find_scenario
+from gripbench.bench.catalogue.scenarios import PREFIX, all_scenario_files, find_scenario
 from gripbench.bench.catalogue.suites import load_suite, suite_files
-from gripbench.bench.ranking.summary import MARK, marked
-from gripbench.bench.running.recorded_scenarios import PREFIX
+from gripbench.bench.ranking.marks import MARK, marked
 from gripbench.configuration import read_toml
 from gripbench.envs.instruments.sensors import Sensor
 from gripbench.envs.populations.causes import CAUSES, SHAPES_OF_TYRES

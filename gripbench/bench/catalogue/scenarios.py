@@ -23,6 +23,9 @@ from gripbench.extensions import entry_points, load
 
 SCENARIO_GROUP = "gripbench.scenarios"
 
+PREFIX = "recording:"
+"""What the name of a recording begins with, where a scenario's name may stand."""
+
 
 def all_scenario_files() -> dict[str, Path]:
     """Return the scenario files by name: those that ship and those of installed packages."""
@@ -40,7 +43,7 @@ def find_scenario(name: str) -> Scenario:
     InputError
         If there is no such scenario; the message names the nearest one.
     """
-    if name.startswith("recording:"):
+    if name.startswith(PREFIX):
         from gripbench.bench.running.recorded_scenarios import recorded_scenario  # reads the log
 
         return recorded_scenario(name)

@@ -74,7 +74,7 @@ def _print(header: Sequence[str], lines: Iterable[Sequence[str]]) -> None:
     from gripbench.bench.publishing.columns import Table
     from gripbench.bench.publishing.tables import show
     from gripbench.bench.publishing.terminal import console
-    from gripbench.bench.ranking.summary import FOOTNOTE, MARK
+    from gripbench.bench.ranking.marks import FOOTNOTE, MARK
 
     found = list(lines)
     show(Table.of_texts(header, found))

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from gripbench.bench.commands import LOGS
-from gripbench.bench.running.store import DEFAULT_RESULTS
+from gripbench.writing import DEFAULT_RESULTS
 
 RECORDING = "Name of a recording, folder of an imported one, or a map (TOML) beside its log."
 

@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from gripbench.bench.commands import PUBLISH
-from gripbench.bench.running.store import DEFAULT_RESULTS
+from gripbench.writing import DEFAULT_RESULTS
 
 SEEDS = 20
 """Seeds of a published suite."""

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from gripbench.bench.commands import RANK
-from gripbench.bench.running.store import DEFAULT_RESULTS
+from gripbench.writing import DEFAULT_RESULTS
 
 Results = Annotated[Path, typer.Option(help="Folder of the stored rows.")]
 Scenarios = Annotated[list[str] | None, typer.Option(help="Only this scenario; repeat for more.")]

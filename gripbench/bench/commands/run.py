@@ -10,7 +10,7 @@ import typer
 from typer.core import TyperCommand
 
 from gripbench.bench.commands import RUN
-from gripbench.bench.running.store import DEFAULT_RESULTS
+from gripbench.writing import DEFAULT_RESULTS
 
 MOST_LINES = 40
 """Lines of methods and faults up to which `--faults` prints each of them."""

@@ -7,12 +7,13 @@ from typing import Annotated, Any
 
 import typer
 
-from gripbench.bench.running.store import DEFAULT_RESULTS
+from gripbench.bench.commands import RANK
+from gripbench.writing import DEFAULT_RESULTS
 
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
-    app.command("sensitivity")(sensitivity)
+    app.command("sensitivity", rich_help_panel=RANK)(sensitivity)
 
 
 def sensitivity(

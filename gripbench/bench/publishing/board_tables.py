@@ -13,17 +13,17 @@ from gripbench.bench.publishing.columns import Column, Table
 from gripbench.bench.publishing.consistency_table import uncertainty_columns, uncertainty_note
 from gripbench.bench.publishing.timings import RelativeRuntime
 from gripbench.bench.ranking.answers import Answer
-from gripbench.bench.ranking.plans import plan_of
-from gripbench.bench.ranking.ranking import Board
-from gripbench.bench.ranking.resolution import resolution
-from gripbench.bench.ranking.skill import NO_BETTER
-from gripbench.bench.ranking.summary import (
+from gripbench.bench.ranking.marks import (
     FOOTNOTE,
     MARKED_BY,
     OUTSIDE_FOOTNOTE,
     marked,
     training_note,
 )
+from gripbench.bench.ranking.plans import plan_of
+from gripbench.bench.ranking.ranking import Board
+from gripbench.bench.ranking.resolution import resolution
+from gripbench.bench.ranking.skill import NO_BETTER
 from gripbench.bench.scoring.metric import SIGNAL_UNIT, Metric
 from gripbench.bench.scoring.metrics import metrics
 from gripbench.envs.signals import signal

@@ -13,12 +13,12 @@ import math
 import numbers
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
-
-import numpy as np
-import pandas as pd
+from typing import TYPE_CHECKING, Any, Literal
 
 from gripbench.errors import InputError, nearest, one_line
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 MISSING = "–"
 """What a renderer shows where there is no value; CSV leaves the cell empty."""
@@ -142,7 +142,7 @@ class Table:
         value = self.rows[row][column.key]
         if is_missing(value):
             return MISSING
-        if isinstance(value, bool | np.bool_):
+        if is_truth(value):
             return "yes" if value else "no"
         if isinstance(value, numbers.Real):
             return _without_exponent(format(value, column.format), float(value))
@@ -176,7 +176,16 @@ def _without_exponent(text: str, value: float) -> str:
 
 def is_missing(value: Any) -> bool:
     """Return whether a cell has no value: None, NaN or pandas' NA."""
-    return value is None or value is pd.NA or (isinstance(value, float) and math.isnan(value))
+    return (
+        value is None
+        or type(value).__name__ == "NAType"
+        or (isinstance(value, float) and math.isnan(value))
+    )
+
+
+def is_truth(value: Any) -> bool:
+    """Return whether a cell holds a yes or no, Python's or NumPy's."""
+    return isinstance(value, bool) or type(value).__name__ == "bool"
 
 
 def _groups(rows: Sequence[Mapping[str, Any]], key: str) -> Iterable[range]:
@@ -189,7 +198,7 @@ def _groups(rows: Sequence[Mapping[str, Any]], key: str) -> Iterable[range]:
 
 def is_number(value: Any) -> bool:
     """Return whether a cell holds a number, which a boolean is not."""
-    number = isinstance(value, numbers.Real) and not isinstance(value, bool | np.bool_)
+    number = isinstance(value, numbers.Real) and not is_truth(value)
     return number and not is_missing(value)
 
 

@@ -13,7 +13,7 @@ from gripbench.bench.publishing.columns import Column, Table
 from gripbench.bench.publishing.leaderboard import Leaderboard, read
 from gripbench.bench.publishing.presentation import significant
 from gripbench.bench.publishing.tables import markdown
-from gripbench.bench.ranking.summary import FOOTNOTE, MARK
+from gripbench.bench.ranking.marks import FOOTNOTE, MARK
 from gripbench.bench.scoring.metric import pooled_rms
 from gripbench.envs.signals import signal
 from gripbench.methods.contract import CompiledMethod, Parameter

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 from gripbench.bench.publishing.columns import Column, Table
 from gripbench.bench.publishing.tables import show, width_of
 from gripbench.bench.publishing.terminal import console
-from gripbench.bench.ranking.summary import (
+from gripbench.bench.ranking.marks import (
     FOOTNOTE,
     MARKED_BY,
     OUTSIDE_FOOTNOTE,
-    failures,
     marked,
     training_note,
 )
+from gripbench.bench.ranking.summary import failures
 from gripbench.envs.signals import signal
 
 if TYPE_CHECKING:

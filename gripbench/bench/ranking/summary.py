@@ -13,22 +13,6 @@ from gripbench.bench.scoring.metric import pooled_rms
 if TYPE_CHECKING:
     import pandas as pd
 
-MARK = "†"
-"""Follows the name of a method that reads a channel which no sensor in a vehicle gives."""
-
-FOOTNOTE = f"{MARK} reads an idealised channel, which no sensor in a vehicle gives"
-
-OUTSIDE = "‡"
-"""Follows the name of a method whose estimates were handed in."""
-
-MARKED_BY = ("idealised", "computed_outside", "training")
-"""Columns that decide on a method's marks, in the order in which `marked` takes them."""
-
-TRAINED = "§"
-"""Follows the name of a method that was trained."""
-
-OUTSIDE_FOOTNOTE = f"{OUTSIDE} computed outside: neither causality nor runtime checked"
-
 
 def summary(rows: pd.DataFrame) -> pd.DataFrame:
     """Return one line for each scenario, target and method.
@@ -124,38 +108,12 @@ def _mean_of_settled(delays: np.ndarray) -> tuple[int, float, float, float]:
     return len(finite), mean, float(low), float(high)
 
 
-def marked(
-    label: str, idealised: str | tuple[str, ...], outside: bool = False, training: str = ""
-) -> str:
-    """Return a method's label with its marks.
-
-    Parameters
-    ----------
-    label
-        The label.
-    idealised
-        Idealised channels that it reads.
-    outside
-        Whether its estimates were handed in.
-    training
-        How it was trained.
-    """
-    marks = ((MARK, idealised), (OUTSIDE, outside), (TRAINED, training))
-    return label + "".join(mark for mark, there in marks if there)
-
-
 def training_of(rows: pd.DataFrame) -> tuple[str, float]:
     """Return how the method of these rows was trained, and how long it took [s]; old rows: `""`."""
     if "training" not in rows:
         return "", math.nan
     said = [text for text in rows["training"].fillna("").astype(str) if text]
     return (said[-1] if said else ""), float(rows["training_time"].astype(float).median())
-
-
-def training_note(label: str, training: str, seconds: float) -> str:
-    """Return the sentence on a method's training."""
-    took = "" if math.isnan(seconds) else f", in {seconds:.3g} s"
-    return f"{label}{TRAINED} {training}{took}"
 
 
 def outside_of(rows: pd.DataFrame) -> pd.Series:

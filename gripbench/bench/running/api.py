@@ -17,10 +17,11 @@ from gripbench.bench.running.isolation.limits import Limits
 from gripbench.bench.running.recorded_scenarios import recording_of
 from gripbench.bench.running.rows import Row, frame_of
 from gripbench.bench.running.runner import Plan, run_plan
-from gripbench.bench.running.store import DEFAULT_RESULTS, Store
+from gripbench.bench.running.store import Store
 from gripbench.envs.scenarios import LEVELS, Scenario
 from gripbench.envs.worlds import at_level
 from gripbench.errors import InputError
+from gripbench.writing import DEFAULT_RESULTS
 
 MOST_SEEDS = 1_000_000
 """Largest number of seeds of one run: a row each would fill a disk long before."""

@@ -6,13 +6,11 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gripbench.bench.catalogue.scenarios import PREFIX as PREFIX
 from gripbench.errors import InputError
 
 if TYPE_CHECKING:
     from gripbench.logs.importing import ImportedLog
-
-PREFIX = "recording:"
-"""What the names of recorded scenarios begin with."""
 
 STORED = Path("recordings")
 """Where `gripbench import` keeps recordings unless told otherwise."""

@@ -21,13 +21,10 @@ from gripbench.bench.running.check_records import mark_of
 from gripbench.bench.running.rows import Checked, Row, frame_of, is_newer, row_from
 from gripbench.errors import InputError, one_line
 from gripbench.sources import digest
-from gripbench.writing import write_atomically
+from gripbench.writing import DEFAULT_RESULTS, write_atomically
 
 if TYPE_CHECKING:
     import pandas as pd
-
-DEFAULT_RESULTS = Path("results")
-"""Where commands keep results unless told otherwise, under the working directory."""
 
 _HEAD = '{"checksum": "'
 _MIDDLE = '", "row": '

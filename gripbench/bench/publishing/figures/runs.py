@@ -12,9 +12,9 @@ from gripbench.bench.running.execution import execute, missing
 from gripbench.bench.running.fitting import fitted
 from gripbench.bench.running.isolation.limits import Limits
 from gripbench.bench.running.recorded_scenarios import on_recording, recording_of
-from gripbench.bench.running.store import DEFAULT_RESULTS
 from gripbench.envs.recordings import Recording
 from gripbench.errors import InputError
+from gripbench.writing import DEFAULT_RESULTS
 
 
 class Runs:

@@ -22,11 +22,12 @@ from gripbench.bench.publishing.figures.style import axis_scale
 from gripbench.bench.publishing.presentation import significant
 from gripbench.bench.ranking.answers import words
 from gripbench.bench.ranking.grids import opening
+from gripbench.bench.ranking.marks import MARKED_BY, marked
 from gripbench.bench.ranking.plans import road_of, standing_of
 from gripbench.bench.ranking.ranking import Board, boards
 from gripbench.bench.ranking.resolution import resolution
 from gripbench.bench.ranking.statistics import performance_profile
-from gripbench.bench.ranking.summary import MARKED_BY, failures, marked, summary
+from gripbench.bench.ranking.summary import failures, summary
 from gripbench.envs.instruments.faults import split_faults
 from gripbench.envs.signals import signal
 from gripbench.errors import InputError
