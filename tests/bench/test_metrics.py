@@ -131,7 +131,7 @@ def test_runs_are_pooled_by_totals_and_not_by_their_values():
 )
 def test_an_entry_point_that_is_no_metric_is_one_line(monkeypatch, entry, message):
     point = importlib.metadata.EntryPoint("own", entry, registry.GROUP)
-    monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: [point])
+    monkeypatch.setattr(registry, "entry_points", lambda group: {"own": point})
     registry.metrics.cache_clear()
     try:
         with pytest.raises(registry.InputError, match=message) as caught:

@@ -51,7 +51,7 @@ def show(
     name: Annotated[str, typer.Argument(help="A scenario, method, vehicle, suite...")],
 ) -> None:
     """Show the full settings of whatever has this name, as JSON."""
-    from gripbench.bench.catalogue.listing import settings
+    from gripbench.bench.catalogue.showing import settings
     from gripbench.bench.publishing.terminal import console
 
     console().print_json(json.dumps(settings(name)))

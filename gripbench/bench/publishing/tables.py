@@ -30,7 +30,7 @@ from gripbench.bench.publishing.columns import (
     is_right,
 )
 from gripbench.bench.publishing.latex import latex_line, latex_number, latex_text
-from gripbench.bench.publishing.terminal import console
+from gripbench.bench.publishing.terminal import console, has_width
 from gripbench.errors import one_line, unknown
 
 
@@ -43,7 +43,8 @@ def terminal(table: Table) -> rich.table.Table:
         shown.add_column(
             rich.text.Text(one_line(column.heading)),
             justify="right" if right else "left",
-            no_wrap=right,
+            no_wrap=right or column is columns[0],  # a name is whole, whatever the width
+            overflow="fold",
         )
     best = table.best()
     for group in table.groups:
@@ -239,7 +240,7 @@ def render(table: Table, format_name: str) -> str:
 
 
 def show(table: Table, format_name: str = "terminal", stderr: bool = False) -> None:
-    """Print a table: with rich on a terminal, else in one of `FORMATS`.
+    """Print a table: as a grid that fits a terminal, or in one of `FORMATS`; plainly into a pipe.
 
     Raises
     ------
@@ -252,7 +253,7 @@ def show(table: Table, format_name: str = "terminal", stderr: bool = False) -> N
         print(render(table, format_name), end="")
         return
     out = console(stderr)
-    if not out.is_terminal:
+    if not out.is_terminal and not has_width():
         print(plain(table), end="", file=sys.stderr if stderr else sys.stdout)
         return
     if table.caption:

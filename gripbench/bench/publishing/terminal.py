@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from typing import Any
 
@@ -21,18 +22,23 @@ class _LiteralConsole(Console):
 
 
 def console(stderr: bool = False) -> Console:
-    """Return the console for texts and tables; wide where no terminal sets a width.
+    """Return the console for texts and tables; wide where nothing sets a width.
 
     Names, reasons and notes come from outside: here alone they become letters on a line.
     """
     stream = sys.stderr if stderr else sys.stdout
     return _LiteralConsole(
         stderr=stderr,
-        width=None if stream.isatty() else 200,
+        width=None if stream.isatty() or has_width() else 200,
         highlight=False,
         markup=False,
         emoji=False,
     )
+
+
+def has_width() -> bool:
+    """Return whether the environment says how wide a terminal is."""
+    return os.environ.get("COLUMNS", "").isdigit()
 
 
 def progress(description: str, total: int) -> Progress:
