@@ -7,6 +7,9 @@ A page marks a block as the output of a command::
     ...
     ```
 
+A command is `gripbench` or `python` with its arguments; `{folder}` is a folder that goes away, and
+`| tail N` after it keeps the last N lines.
+
 `python docs/site/printed.py` writes what the commands print now into the pages; the site runs them
 when it is built, and a test holds the pages against them. An output is kept in `.cache/printed`
 until a source of gripbench or a published result changes.
@@ -20,13 +23,15 @@ import re
 import shlex
 import subprocess
 import sys
+import tempfile
 from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
+_GRIPBENCH = "from gripbench.bench.command_line import main; main()"
 CACHE = ROOT / ".cache" / "printed"
 BLOCK = re.compile(
-    r"(?P<head><!-- printed by: (?P<command>gripbench [^\n]+?) -->\n+```\w*\n)"
+    r"(?P<head><!-- printed by: (?P<command>(?:gripbench|python) [^\n]+?) -->\n+```\w*\n)"
     r"(?P<text>.*?)(?P<tail>```)",
     re.DOTALL,
 )
@@ -48,18 +53,24 @@ def printed(command: str) -> str:
     kept = CACHE / f"{hashlib.sha256(f'{command} {_state()}'.encode()).hexdigest()[:24]}.txt"
     if kept.is_file():
         return kept.read_text(encoding="utf-8")
-    program = "from gripbench.bench.command_line import main; main()"
-    done = subprocess.run(
-        [sys.executable, "-c", program, *shlex.split(command)[1:]],
-        cwd=ROOT,
-        env={**os.environ, "COLUMNS": "100", "NO_COLOR": "1", "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        timeout=600,
-    )
+    call, _, last = command.partition(" | tail ")
+    with tempfile.TemporaryDirectory() as folder:
+        program, *arguments = shlex.split(call.replace("{folder}", folder))
+        start = ["-c", _GRIPBENCH] if program == "gripbench" else []
+        done = subprocess.run(
+            [sys.executable, *start, *arguments],
+            cwd=ROOT,
+            env={**os.environ, "COLUMNS": "100", "NO_COLOR": "1", "PYTHONPATH": str(ROOT)},
+            capture_output=True,
+            text=True,
+            timeout=600,
+        )
     if done.returncode:
         raise RuntimeError(f"{command}: exit code {done.returncode}: {done.stderr.strip()}")
-    text = "".join(line.rstrip() + "\n" for line in done.stdout.strip("\n").splitlines())
+    lines = [line.rstrip() for line in done.stdout.strip("\n").splitlines()]
+    while lines and not lines[0]:
+        del lines[0]
+    text = "".join(f"{line}\n" for line in lines[-int(last or 0) :])
     CACHE.mkdir(parents=True, exist_ok=True)
     kept.write_text(text, encoding="utf-8")
     return text

@@ -120,6 +120,39 @@ def test_a_method_fails_where_runs_failed_but_not_where_they_were_skipped():
     assert method_pages.failures_of("skipped", board) == []
 
 
+NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
+RATIOS = {("yoon2015", "4.97"), ("yoon2015", "0.58")}
+"""Quotients of two published figures."""
+
+
+@pytest.mark.parametrize("paper", ["anderson2004", "dakhlallah2008", "li2014", "yoon2015"])
+def test_figures_of_ours_in_a_paper_s_tables_are_the_published_ones(paper):
+    published = [
+        float(number)
+        for file in (ROOT / "results" / paper).glob("*.csv")
+        for number in NUMBER.findall(file.read_text(encoding="utf-8"))
+    ]
+    heading: list[str] = []
+    for line in (ROOT / "docs" / f"{paper}.md").read_text(encoding="utf-8").splitlines():
+        cells = [cell.strip() for cell in line.strip("|").split("|")] if line[:1] == "|" else []
+        heading = heading if heading and cells else cells
+        for title, cell in zip(heading, cells, strict=False):
+            for text in NUMBER.findall(cell) if title.lower() in ("ours", "gripbench") else ():
+                half = 0.51 * 10.0 ** -len(text.partition(".")[2])
+                near = any(abs(abs(one) - abs(float(text))) <= half for one in published)
+                assert near or (paper, text) in RATIOS, line
+
+
+def test_the_closing_lines_of_the_readme_are_those_of_the_published_reproduction():
+    closing = re.search(
+        r"```\n(\d+ of \d+ cells.*?)```", (ROOT / "README.md").read_text("utf-8"), re.S
+    )
+    assert closing is not None
+    published = (ROOT / "results" / "li2014" / "README.md").read_text(encoding="utf-8")
+    for line in closing[1].splitlines():
+        assert f"- {line}\n" in published
+
+
 @pytest.mark.slow
 def test_marked_blocks_hold_what_their_commands_print():
     sys.path.append(str(ROOT / "docs" / "site"))

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import gripbench
 
-ROOT = Path(gripbench.__file__).parent
+ROOT = Path(gripbench.__file__).parent / "bench"
 
 
 def modules_with(pattern):
@@ -18,8 +18,8 @@ def modules_with(pattern):
 
 
 def test_tables_of_a_terminal_are_made_in_one_module():
-    assert modules_with(r"rich\.table|rich\.box|rich import box") == {"bench/publishing/tables.py"}
+    assert modules_with(r"rich\.table|rich\.box|rich import box") == {"publishing/tables.py"}
 
 
 def test_colours_of_pictures_are_named_in_one_module():
-    assert modules_with(r"#[0-9a-fA-F]{6}") == {"bench/publishing/figures/style.py"}
+    assert modules_with(r"#[0-9a-fA-F]{6}") == {"publishing/figures/style.py"}

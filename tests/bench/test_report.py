@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import html
 import html.parser
 import json
 import re
@@ -184,7 +185,7 @@ def test_the_page_shows_failures_papers_and_manifests(report):
     assert "the scenario has no sensor for" in report
     assert "&lt;Simple&gt;" in report
     assert "1 of 2 cells match." in report
-    assert "&quot;commit&quot;: &quot;abc&quot;" in report
+    assert '"commit": "abc"' in html.unescape(report)
 
 
 def test_an_absent_recording_is_a_note_and_no_failure(tmp_path):

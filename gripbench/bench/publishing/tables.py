@@ -36,7 +36,9 @@ from gripbench.errors import one_line, unknown
 
 def terminal(table: Table) -> rich.table.Table:
     """Return the columns and rows of a table as rich prints them."""
-    shown = rich.table.Table(box=rich.box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
+    shown = rich.table.Table(
+        box=rich.box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False, show_edge=False
+    )
     columns = _on_terminal(table)
     for column in columns:
         right = is_right(table, column)

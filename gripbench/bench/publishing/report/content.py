@@ -23,7 +23,7 @@ from gripbench.bench.publishing.presentation import significant
 from gripbench.bench.ranking.answers import words
 from gripbench.bench.ranking.grids import opening
 from gripbench.bench.ranking.marks import MARKED_BY, marked
-from gripbench.bench.ranking.plans import road_of, standing_of
+from gripbench.bench.ranking.plans import plan_of, road_of, standing_of
 from gripbench.bench.ranking.ranking import Board, boards
 from gripbench.bench.ranking.resolution import resolution
 from gripbench.bench.ranking.statistics import performance_profile
@@ -126,6 +126,22 @@ def found_boards(rows: pd.DataFrame, targets: Sequence[str]) -> list[Board]:
         found += boards(rows, target)
     found.sort(key=lambda board: (standing_of(board), opening(board.sensors) > 0))
     return found
+
+
+def boards_by_road(rows: pd.DataFrame, targets: Sequence[str]) -> list[tuple[str, Board]]:
+    """Return the boards of each kind of road alone, where a plan has several kinds."""
+    roads: dict[str, dict[str, list[str]]] = {}
+    for name in rows["scenario"].unique():
+        roads.setdefault(plan_of(name), {}).setdefault(road_of(name), []).append(name)
+    of_road: dict[str, list[str]] = {}
+    for kinds in roads.values():
+        for road, names in kinds.items() if len(kinds) > 1 else ():
+            of_road.setdefault(road, []).extend(names)
+    return [
+        (road, board)
+        for road, names in of_road.items()
+        for board in found_boards(rows[rows["scenario"].isin(names)], targets)
+    ]
 
 
 def heat_map(rows: pd.DataFrame, target: str) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from gripbench.bench.publishing.leaderboard import uncertainty_boards
 from gripbench.bench.publishing.manifest import commit
 from gripbench.bench.publishing.pages import template
 from gripbench.bench.publishing.report.content import (
+    boards_by_road,
     chosen_targets,
     failure_table,
     found_boards,
@@ -184,7 +185,10 @@ def page(
         answers=answer_table(answers(rows, targets)),
         facts=_facts(rows),
         targets=targets,
-        boards=[_Shown(board) for board in found],
+        boards=[
+            *(_Shown(board) for board in found),
+            *(_Shown(board, road) for road, board in boards_by_road(rows, targets)),
+        ],
         critical=[critical_differences(board) for board in whole.values()],
         faults=degradation_tables(damage) if len(damage) else [],
         every_fault=[every_line(damage, str(name)) for name in damage["target"].unique()]
@@ -200,14 +204,15 @@ def page(
         },
         footer=f"gripbench {gripbench.__version__}, commit {commit()}, {today()}",
         points=POINTS,
+        curves=bool(series),
     )
 
 
 class _Shown:
-    """A board as the page shows it: its answer, its tables, the choice by which it is found."""
+    """A board as the page shows it: its answer, its tables, the choices by which it is found."""
 
-    def __init__(self, board: Board) -> None:
-        self.title, self.target = board.title, board.target
+    def __init__(self, board: Board, road: str = "") -> None:
+        self.title, self.target, self.road = board.title, board.target, road
         self.said, self.narrow, self.wide = shown_board(board)
         first = board.scenarios[:1]
         marks = [text for name in first for text in (plan_of(name), setting_of(name)) if text]

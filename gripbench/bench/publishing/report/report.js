@@ -32,10 +32,12 @@
   const boards = [...document.querySelectorAll(".board")];
   const showBoard = () => {
     const target = byId("board-target").value;
+    const road = byId("board-road").value;
     const sensors = byId("board-sensors").value;
     const text = byId("board-text").value.trim().toLowerCase();
     for (const board of boards) {
-      board.hidden = board.dataset.target !== target || board.dataset.sensors !== sensors;
+      const { dataset } = board;
+      board.hidden = dataset.target !== target || dataset.road !== road || dataset.sensors !== sensors;
       if (board.hidden) continue;
       const rows = [...board.querySelectorAll("tbody tr")];
       for (const row of rows) row.hidden = !row.textContent.toLowerCase().includes(text);
@@ -44,11 +46,18 @@
       byId("board-status").textContent = `${shown} of ${methods.length} methods shown`;
     }
   };
+  const of = (key, chosen) => [...new Set(boards.map((board) => board.dataset)
+    .filter((one) => Object.entries(chosen).every(([name, value]) => one[name] === value))
+    .map((one) => one[key]))];
+  const chooseRoad = () => {
+    const target = byId("board-target").value;
+    fill(byId("board-sensors"), of("sensors", { target, road: byId("board-road").value }));
+    showBoard();
+  };
   const chooseTarget = () => {
     const target = byId("board-target").value;
-    fill(byId("board-sensors"),
-      boards.filter((board) => board.dataset.target === target).map((board) => board.dataset.sensors));
-    showBoard();
+    fill(byId("board-road"), of("road", { target }), (road) => road || "every road");
+    chooseRoad();
   };
   const key = (cell) => {
     const value = cell.dataset.value;
@@ -89,8 +98,9 @@
     if (cell.textContent.length > 60) cell.classList.add("long");
   }
   if (boards.length) {
-    fill(byId("board-target"), [...new Set(boards.map((board) => board.dataset.target))], targetWords);
+    fill(byId("board-target"), of("target", {}), targetWords);
     byId("board-target").addEventListener("change", chooseTarget);
+    byId("board-road").addEventListener("change", chooseRoad);
     byId("board-sensors").addEventListener("change", showBoard);
     byId("board-text").addEventListener("input", showBoard);
     chooseTarget();
