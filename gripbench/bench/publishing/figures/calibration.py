@@ -12,7 +12,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gripbench.bench.publishing.figures.runs import Runs
-from gripbench.bench.publishing.figures.style import legend_above, line, new_figure, series_style
+from gripbench.bench.publishing.figures.style import (
+    TRUTH,
+    legend_above,
+    line,
+    new_figure,
+    series_style,
+)
 from gripbench.bench.scoring.consistency import chi_square_test
 from gripbench.bench.scoring.distributions import Floats, Quantiles, Stated
 from gripbench.bench.scoring.scoring import context_of
@@ -59,7 +65,7 @@ def reliability_plot(
     """
     figure = new_figure(5.0, 5.2)
     axes = figure.subplots()
-    axes.plot([0.0, 1.0], [0.0, 1.0], color="#000000", linewidth=0.8)
+    axes.plot([0.0, 1.0], [0.0, 1.0], color=TRUTH.color, linewidth=0.8)
     for index, (label, every) in enumerate(_over_runs(runs, scenario, methods, name, seeds)):
         below: list[list[float]] = []
         levels: tuple[float, ...] = LEVELS
@@ -116,8 +122,8 @@ def nees_plot(runs: Runs, scenario: str, methods: Sequence[str], name: str, seed
         mean = np.nanmean(table[:, shown], axis=0)
         line(axes, times[shown], mean, label, series_style(index), index / len(methods))
     band = chi_square_test(np.ones(seeds), confidence=_CONFIDENCE)
-    axes.axhspan(band.low, band.high, color="#000000", alpha=0.12, linewidth=0.0)
-    axes.axhline(1.0, color="#000000", linewidth=0.8)
+    axes.axhspan(band.low, band.high, color=TRUTH.color, alpha=0.12, linewidth=0.0)
+    axes.axhline(1.0, color=TRUTH.color, linewidth=0.8)
     axes.set_yscale("log")
     axes.set_xlabel("Time [s]")
     axes.set_ylabel(f"NEES of {name}")

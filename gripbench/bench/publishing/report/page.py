@@ -221,7 +221,7 @@ class _Shown:
 
 
 class _Stated:
-    """A board of uncertainty as the page shows it: its answer, its table, what is stated and seen."""
+    """A board of uncertainty as the page shows it: its answer, table and diagram."""
 
     def __init__(self, board: Board) -> None:
         setting = setting_of(board.scenarios[0]) if board.scenarios else ""
