@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import unicodedata
 from collections.abc import Iterable
+from pathlib import Path
 
 LONGEST = 500
 """Most characters that a text from outside keeps: a reason, a title."""
@@ -91,3 +92,21 @@ def nearest(name: str, known: Iterable[str]) -> str:
 def unknown(kind: str, name: str, known: Iterable[str]) -> InputError:
     """Return the error for a name that nobody knows, with the nearest known one."""
     return InputError(f"unknown {kind} {name!r}: {nearest(name, known)}")
+
+
+def describe_error(error: BaseException) -> str:
+    """Return an exception as one sentence with the place where it was raised."""
+    place = error.__traceback__
+    while place is not None and place.tb_next is not None:
+        place = place.tb_next
+    try:
+        message = one_line(" ".join(str(error).split()), LONGEST)
+    except Exception:  # its own code makes the text
+        message = "its message cannot be read"
+    text = f"{type(error).__name__}: {message}" if message else type(error).__name__
+    if isinstance(error, GripbenchError):
+        return message
+    if place is None:
+        return text
+    code = place.tb_frame.f_code
+    return f"{text} (in {code.co_name}, {Path(code.co_filename).name}:{place.tb_lineno})"

@@ -103,6 +103,10 @@ class CompiledMethod:
         Whether it is a trivial estimator that others are measured against.
     files
         Data files that it reads, relative to its own: their content is part of every row's key.
+    packages
+        Packages beside gripbench's own that it imports; without them its cells are skipped.
+    lag
+        Age of its estimates [s]: at time t it tells of t - lag, and is scored there.
     state
         Structured type of what it keeps between samples; all zero after `reset`.
     step
@@ -125,6 +129,8 @@ class CompiledMethod:
     variants: ClassVar[Mapping[str, Any]] = {}
     printed: ClassVar[str] = ""
     files: tuple[str, ...] = ()
+    packages: ClassVar[tuple[str, ...]] = ()
+    lag: ClassVar[float] = 0.0
     baseline: ClassVar[bool] = False
     state: ClassVar[np.dtype[Any]]
     step: Callable[..., Any]

@@ -54,6 +54,13 @@ def observation_type(channels: tuple[str, ...]) -> np.dtype[Any]:
 
 def online(method: CompiledMethod, records: Records, obs: Mapping[str, float]) -> dict[str, float]:
     """Advance a method by one sample and return its estimates by name."""
+    fill(method, records, obs)
+    _call(method, _single(method.step), *_arrays(records, records.obs))
+    return dict(zip(method.outputs, records.est[0].item(), strict=True))
+
+
+def fill(method: CompiledMethod, records: Records, obs: Mapping[str, float]) -> None:
+    """Copy what a method reads of a sample into its records."""
     sample = records.obs
     names = (sample.dtype.names or ())[:-2]
     try:
@@ -61,8 +68,6 @@ def online(method: CompiledMethod, records: Records, obs: Mapping[str, float]) -
     except KeyError:
         given = [_reading(method, obs, name) for name in names]
     sample[0] = (*given, 0.0, 0.0)
-    _call(method, _single(method.step), *_arrays(records, sample))
-    return dict(zip(method.outputs, records.est[0].item(), strict=True))
 
 
 def compile_single(method: CompiledMethod) -> None:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy.typing as npt
 
 from gripbench.bench.catalogue.arrays import given_state
-from gripbench.bench.catalogue.declarations import Declaration, declaration_of, describe_error, make
+from gripbench.bench.catalogue.declarations import Declaration, declaration_of, make
 from gripbench.bench.catalogue.expectations import (
     CHECKS,
     FIRST,
@@ -46,7 +46,7 @@ from gripbench.envs.scenarios import Scenario
 from gripbench.envs.signals import NEW
 from gripbench.envs.vehicles import load_vehicle
 from gripbench.envs.worlds import record
-from gripbench.errors import InputError, nearest
+from gripbench.errors import InputError, describe_error, nearest
 
 PASSED = "PASSED"
 SKIPPED = "SKIPPED: "

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import inspect
+import math
 import pickle
 import re
 import sys
@@ -17,7 +18,15 @@ from typing import Any, Literal
 
 from gripbench.bench.catalogue.training import checked_training, training_of
 from gripbench.envs.signals import SIGNALS, signal
-from gripbench.errors import LONGEST, GripbenchError, InputError, nearest, one_line, unknown
+from gripbench.errors import (
+    LONGEST,
+    GripbenchError,
+    InputError,
+    describe_error,
+    nearest,
+    one_line,
+    unknown,
+)
 from gripbench.methods.contract import CompiledMethod
 from gripbench.methods.outputs import checked_quantiles, fields_of
 from gripbench.methods.settings import Variant
@@ -46,6 +55,8 @@ class Declaration:
     ranges: dict[str, tuple[float, float, float]] = field(default_factory=dict)
     quantiles: dict[str, tuple[float, ...]] = field(default_factory=dict)
     innovations: tuple[str, ...] = ()
+    packages: tuple[str, ...] = ()
+    lag: float = 0.0
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -184,7 +195,7 @@ def declaration_of(
 
 _READ = (
     "name", "title", "reference", "sensors", "estimates", "variances", "quantiles", "innovations",
-    "vehicle_parameters", "files", "baseline",
+    "vehicle_parameters", "files", "packages", "lag", "baseline",
 )  # fmt: skip
 
 LONGEST_NAME = 100
@@ -226,6 +237,9 @@ def declaration_from(given: Mapping[str, Any], kind: str = "method") -> Declarat
     for estimate in variances:
         if estimate not in estimates:
             raise InputError(f"{name}: 'variances' names '{estimate}', which it does not estimate")
+    lag = given.get("lag") or 0.0
+    if not isinstance(lag, float | int) or not 0.0 <= lag < math.inf:
+        raise InputError(f"{name}: set 'lag' to seconds, 0 or more (it is {str(lag)[:120]!r})")
     settings, variant = given.get("settings"), given.get("variant")
     if not isinstance(settings, Mapping) or not isinstance(variant, str):
         raise InputError(f"{name}: its settings are no table of values")
@@ -248,6 +262,8 @@ def declaration_from(given: Mapping[str, Any], kind: str = "method") -> Declarat
         **checked_training(given, name),
         quantiles=checked_quantiles(name, given.get("quantiles"), estimates, variances),
         innovations=_signals(given, name, "innovations"),
+        packages=_names(given, name, "packages", "package"),
+        lag=float(lag),
     )
 
 
@@ -380,21 +396,3 @@ def _class_in(module: ModuleType, name: str, path: Path) -> Any:
         found = ", ".join(sorted(methods)) or "none"
         raise InputError(f"{path}: name the class, as in {path.name}:MyFilter (found: {found})")
     return next(iter(methods.values()))
-
-
-def describe_error(error: BaseException) -> str:
-    """Return an exception as one sentence with the place where it was raised."""
-    place = error.__traceback__
-    while place is not None and place.tb_next is not None:
-        place = place.tb_next
-    try:
-        message = one_line(" ".join(str(error).split()), LONGEST)
-    except Exception:  # its own code makes the text
-        message = "its message cannot be read"
-    text = f"{type(error).__name__}: {message}" if message else type(error).__name__
-    if isinstance(error, GripbenchError):
-        return message
-    if place is None:
-        return text
-    code = place.tb_frame.f_code
-    return f"{text} (in {code.co_name}, {Path(code.co_filename).name}:{place.tb_lineno})"

@@ -15,7 +15,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from gripbench.bench.catalogue.declarations import Source, describe_error
+from gripbench.bench.catalogue.declarations import Source
 from gripbench.bench.catalogue.registry import MethodSpec, method_digest
 from gripbench.bench.running.deadline import DeadlineError, deadline
 from gripbench.bench.running.dependencies import folder_of, kept, unchanged
@@ -34,10 +34,10 @@ from gripbench.bench.running.recorded_scenarios import (
 from gripbench.bench.running.rows import Row, Status
 from gripbench.bench.running.store import row_path
 from gripbench.bench.scoring.recovery import RECOVERY, recovery
-from gripbench.bench.scoring.scoring import DivergedError, score, targets_of
+from gripbench.bench.scoring.scoring import DivergedError, at_lag, score, targets_of
 from gripbench.envs.recordings import Recording
 from gripbench.envs.scenarios import Scenario
-from gripbench.errors import GripbenchError, InputError
+from gripbench.errors import GripbenchError, InputError, describe_error
 from gripbench.sources import digest
 
 
@@ -230,6 +230,7 @@ def run_cell(
         read = outcome.read
         if isinstance(cell.scenario, RecordedScenario):
             recording = judged(recording, outcome.estimates)
+        recording = at_lag(recording, declaration.lag)
         scores = score(outcome.estimates, declaration.outputs, targets, recording)
         if recording.clean is not None:
             twin = _outcome(cell, replace(recording, observations=recording.clean), limits, False)

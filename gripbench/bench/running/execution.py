@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from importlib.util import find_spec
 from numbers import Real
 from typing import Any
 
@@ -66,12 +67,15 @@ class Outcome:
 def missing(
     declaration: Declaration, vehicle: Mapping[str, float], channels: tuple[str, ...]
 ) -> str:
-    """Return why a method cannot run where only these channels are given; empty: it can."""
+    """Return why a method cannot run here, given only these channels; empty: it can."""
     sensors, parameters = lacking(declaration, vehicle, channels)
     if sensors:
         return "the scenario has no sensor for " + ", ".join(f"'{name}'" for name in sensors)
     if parameters:
         return "the vehicle does not give " + ", ".join(f"'{name}'" for name in parameters)
+    absent = [name for name in declaration.packages if find_spec(name) is None]
+    if absent:
+        return f"the package '{absent[0]}' is not installed: pip install {absent[0]}"
     return ""
 
 

@@ -20,7 +20,7 @@ import numpy as np
 from pydantic import Field
 
 from gripbench.bench.catalogue.arrays import Arrays, numbers_of_fit, packed, unpacked
-from gripbench.bench.catalogue.declarations import Declaration, describe_error
+from gripbench.bench.catalogue.declarations import Declaration
 from gripbench.bench.catalogue.registry import MethodSpec, method_digest
 from gripbench.bench.catalogue.training import Trained, Training
 from gripbench.bench.running.courses import EACH, Course, course_of
@@ -31,7 +31,7 @@ from gripbench.bench.running.isolation.limits import CellFailure, Limits
 from gripbench.bench.running.isolation.loading import Settings
 from gripbench.bench.running.isolation.training_drives import TrainingDrive, training_drive
 from gripbench.configuration import Configuration, parse
-from gripbench.errors import InputError
+from gripbench.errors import InputError, describe_error
 from gripbench.sources import digest
 from gripbench.writing import being_written
 

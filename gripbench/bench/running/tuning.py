@@ -21,7 +21,7 @@ from gripbench.bench.catalogue.registry import MethodSpec, built_in_methods, cho
 from gripbench.bench.running.execution import SkippedError, execute, missing
 from gripbench.bench.running.recorded_logs import imported_of
 from gripbench.bench.running.recorded_scenarios import judged
-from gripbench.bench.scoring.scoring import DivergedError, check_estimates
+from gripbench.bench.scoring.scoring import DivergedError, at_lag, check_estimates
 from gripbench.envs.recordings import Recording
 from gripbench.envs.signals import signal
 from gripbench.errors import InputError, unknown
@@ -197,7 +197,7 @@ def training_error(spec: MethodSpec, recordings: Sequence[Recording], target: st
             raise InputError(f"{spec.label}: {reason}")
         last = max(end for _, end in recording.windows["train"])
         kept = int(np.searchsorted(recording.truth["time"], last, side="right"))
-        part = cut(recording, kept)
+        part = at_lag(cut(recording, kept), declaration.lag)
         try:
             outcome = execute(spec.make(), declaration, part.vehicle, part.observations, 0.0, False)
         except SkippedError as error:

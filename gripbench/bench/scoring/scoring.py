@@ -193,6 +193,30 @@ def context_of(
     )
 
 
+def at_lag(recording: Recording, lag: float) -> Recording:
+    """Return a recording whose truth at each sample is that of `lag` seconds before.
+
+    A method that tells of the past is compared with the past. There is no truth [NaN] where the
+    recording had not begun.
+
+    Parameters
+    ----------
+    lag
+        Age of the estimates [s].
+    """
+    if not lag:
+        return recording
+    times = recording.truth["time"]
+    places = np.searchsorted(times, times - lag + 1e-9, side="right") - 1
+    truth = recording.truth[np.maximum(places, 0)]
+    for name in truth.dtype.names or ():
+        if name == "time":
+            truth[name] = times
+        else:
+            truth[name][places < 0] = np.nan
+    return replace(recording, truth=truth)
+
+
 class _Channels:
     """Channels of the truth at the samples that count; each is cut out once."""
 

@@ -31,12 +31,7 @@ from numba.core.caching import NullCache
 from numba.core.dispatcher import Dispatcher
 
 from gripbench.bench.catalogue.arrays import given_state
-from gripbench.bench.catalogue.declarations import (
-    Declaration,
-    Source,
-    declaration_of,
-    describe_error,
-)
+from gripbench.bench.catalogue.declarations import Declaration, Source, declaration_of
 from gripbench.bench.running.execution import (
     Observation,
     SkippedError,
@@ -63,7 +58,7 @@ from gripbench.bench.running.isolation.messages import (
 from gripbench.bench.running.isolation.trials import Trial, has_batch, perform
 from gripbench.envs.plants.simulation import Simulation
 from gripbench.envs.signals import record_type
-from gripbench.errors import GripbenchError
+from gripbench.errors import GripbenchError, describe_error
 from gripbench.methods import drivers
 from gripbench.methods.contract import CompiledMethod
 from gripbench.sources import source_files
