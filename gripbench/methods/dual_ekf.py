@@ -5,6 +5,9 @@ parameter estimation, Vehicle System Dynamics 44: in each step the parameter fil
 state filter predicts and is corrected with those parameters, and the parameter filter is corrected
 by the same measurement of a_y with the new states. The cross covariance of states and parameters
 is left out, as in the paper; `joint_ekf` keeps it.
+
+Of its variance: each filter takes what the other estimates for known. What that leaves out adds to
+what the joint filter leaves out.
 """
 
 from __future__ import annotations

@@ -22,6 +22,9 @@ inputs instead of forward Euler on the older ones.
 
 The output v_x is a measurement of this filter, though none of the sensors that the paper lists
 gives it; here it is the channel of an optical speed sensor.
+
+Of its variance: the friction is assumed. On snow and ice the forces are wrong for as long as the
+road is, and Q, white, stands for errors that pass from sample to sample.
 """
 
 from __future__ import annotations

@@ -15,6 +15,9 @@ Corrected here:
   of speed, which no sensor gives. Here the accelerometer's reading is compared with the tyre
   forces less rolling resistance and drag. The variant `paper` keeps the printed form, which is
   fed the idealised channel `speed_x_rate`.
+
+Of its variance: radius, inertia and mass are those on paper and the torque is exact, so that an
+error of a force that stays for the whole drive is no part of it.
 """
 
 from __future__ import annotations

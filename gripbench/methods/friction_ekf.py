@@ -16,6 +16,9 @@ Errata, corrected here; `gripbench.methods.printed.yoon2015` has the printed for
 Where the tyres are not excited the acceleration says nothing about the friction: an update is
 left out while |d a_y / d mu| is small, and while the acceleration itself is, since an error of
 the sideslip looks like sliding on a road of no friction then.
+
+Of its variance: the sideslip is taken for known, and the error of the tyre model, which lasts for
+a whole bend, for white noise.
 """
 
 from __future__ import annotations

@@ -4,6 +4,10 @@ Each class has the single-track filter with brush tyres of its friction; the cla
 and weigh by the likelihood of yaw rate and a_y (Blom & Bar-Shalom 1988; of friction in the form of
 Tsunashima, Murakami & Miyata (2006), Vehicle and road state estimation using interacting multiple
 model approach, Vehicle System Dynamics 44).
+
+Of its variance: the spread between the classes is in it, a bank of the road and offsets of the
+sensors are not, and errors of the tyre model that last are counted as new evidence in every
+sample.
 """
 
 from __future__ import annotations

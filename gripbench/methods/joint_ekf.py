@@ -4,6 +4,9 @@ Wenzel, Burnham, Blundell & Williams (2006), Dual extended Kalman filter for veh
 parameter estimation, Vehicle System Dynamics 44, which compares the dual form (`dual_ekf`) with
 this; the parameters here are the logarithms of the stiffness of each axle over that on paper and of
 the friction, all random walks.
+
+Of its variance: a bank of the road and offsets of the sensors are no states, and last; linearised
+at one friction, it does not see that a road of less would explain the same readings.
 """
 
 from __future__ import annotations

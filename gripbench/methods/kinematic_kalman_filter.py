@@ -15,6 +15,10 @@ Beyond the paper: the scale factor of the gyroscope can be a state (`gyro_scale_
 variant `scale_factor`). The course before and after a turn then shows it, from the covariance
 that heading and scale factor build up in the turn. A late GPS sample is compared with the heading
 of its own time; a repeated or out-of-order one is left out.
+
+Of its variance: outside turns the course is taken for the heading, as if a car that does not turn
+had no sideslip; on ice it has. A scale factor of the gyroscope (known unless `gyro_scale_std` is
+set), the roll of the body and a bank turn the heading in a curve, and are not modelled.
 """
 
 from __future__ import annotations

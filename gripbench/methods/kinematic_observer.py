@@ -7,6 +7,9 @@ Farrelly & Wellstead (1996), Estimation of vehicle lateral velocity, IEEE Conf. 
 Applications; Ungoren, Peng & Tseng (2004), A study on lateral speed estimation methods,
 International Journal of Vehicle Autonomous Systems 2, whose switch on the deviation from the model
 is made smooth: the variance of the pseudo-measurement grows with the square of the deviation.
+
+Of its variance: the model's sideslip is wrong by the bank, the stiffness and the offset for a
+whole bend, and is taken as a measurement with white noise, sample by sample.
 """
 
 from __future__ import annotations

@@ -10,6 +10,10 @@ be run as printed (eq. 9 contradicts eq. 8, and eq. 12 gives the complement of t
 corrected there too. `table_1_noise` has all errata corrected and the noise of Table 1, without the
 allowance for pitch, for the roll on the springs and for the hard iron. `pitch_aware` is meant for
 public roads. The others leave one part out.
+
+Of its variance: each filter takes the one before it for unbiased. Hard iron, a pitched road and
+the springs' roll turn the heading for as long as they last; `heading_share` of it counts as noise.
+The friction filter takes the sideslip for known and every sample of a_y for new evidence.
 """
 
 from __future__ import annotations

@@ -17,6 +17,11 @@ Errata, corrected here:
 
 A late GPS sample is compared with the course that was predicted for its own time; a repeated or
 out-of-order one is left out.
+
+Of its variance: it knows the white noise of gyroscope, steering and GPS and nothing else. That the
+tyres saturate, that mass and stiffness are not those on paper, that the road banks, are errors
+that last for seconds and have no part in Q, so it is far too small on another car than the one on
+paper.
 """
 
 from __future__ import annotations

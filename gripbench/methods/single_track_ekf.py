@@ -5,6 +5,9 @@ that a slide is followed where the road is the one that is assumed. Ray (1995), 
 tire force estimation for advanced vehicle control, IEEE Transactions on Control Systems Technology
 3, and Best, Gordon & Dixon (2000), Vehicle System Dynamics 34; tyres: Pacejka, Tyre and Vehicle
 Dynamics, 3.2.
+
+Of its variance: friction and stiffness are taken for known. Where the road is another one the
+error of the tyre forces lasts for the whole slide; the noise that stands for it is white.
 """
 
 from __future__ import annotations

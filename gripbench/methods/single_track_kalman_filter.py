@@ -8,6 +8,10 @@ steps of the present speed; gyroscope and lateral accelerometer correct it,
 Rajamani, Vehicle Dynamics and Control, 2.3 and 8 (model), Best, Gordon & Dixon (2000), An extended
 adaptive Kalman filter for real-time state estimation of vehicle handling dynamics, Vehicle System
 Dynamics 34 (the two measurements). The speed is fused from wheel speeds, or measured.
+
+Of its variance: the model is linear and so the variance depends on speed and noise, never on what
+is measured: it is the same in a gentle bend and in a slide on ice. Stiffness, bank and offsets are
+errors that last, counted as white noise.
 """
 
 from __future__ import annotations

@@ -4,6 +4,9 @@ The longitudinal speed is that of `gripbench.methods.blocks.speed_fusion`, which
 compose with; beside it stands the lateral velocity of a steady turn on the paper's rear axle
 (Rajamani, Vehicle Dynamics and Control, 3.3), filtered with the time constant that the linear model
 has at that speed, 1/(C_f + C_r) m v.
+
+Of its variance: see `blocks/speed_fusion.py`; the radius of the wheels that stays wrong is added,
+wheels that lock together are not foreseen.
 """
 
 from __future__ import annotations

@@ -13,6 +13,9 @@ are set against the slip angles delta - beta - a r / V and b r / V - beta. Recur
 finds each axle's compliance 1/C from alpha = F / C, with the vehicle's own as the prior value: the
 noise is in the slip angle, so that the force has to be the regressor. Yaw rate and steering angle
 are means since the last course.
+
+Of its variance: that of the model-based filter, which takes the stiffness found here for known;
+where the tyres slide, what is found is no stiffness at all.
 """
 
 from __future__ import annotations

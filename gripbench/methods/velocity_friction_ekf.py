@@ -3,6 +3,9 @@
 The third filter of the cascade on its own, for vehicles whose velocity an optical sensor or motion
 capture measures in both directions: what it finds of the friction then does not depend on how well
 magnetometer and GPS give the sideslip. Errata are those of `friction_ekf`.
+
+Of its variance: that of `friction_ekf`: the error of the tyre model lasts, and is counted as
+white.
 """
 
 from __future__ import annotations
