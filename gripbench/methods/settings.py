@@ -155,6 +155,16 @@ class Variants(Mapping[str, Variant]):
         return self._known
 
 
+def scaled(parameters: tuple[Parameter, ...], factors: Mapping[str, float]) -> dict[str, Setting]:
+    """Return settings: the defaults of some parameters times factors.
+
+    A Kalman filter whose noise and first covariance are all larger by one factor in variance has
+    the same gains, hence the same estimates, and a covariance that is larger by it.
+    """
+    known = {parameter.name: parameter.default for parameter in parameters}
+    return {name: factor * float(known[name]) for name, factor in factors.items()}
+
+
 def checked_settings(
     method: str, parameters: tuple[Parameter, ...], *given: Mapping[str, Setting]
 ) -> dict[str, Setting]:
