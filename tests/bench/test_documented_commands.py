@@ -11,7 +11,10 @@ from gripbench.bench.command_line import application
 from gripbench.bench.ranking.ranking import columns
 
 ROOT = Path(__file__).parents[2]
-FILES = (".github/workflows/benchmark.yml", "docs/ranking.md", "docs/leaderboard.md")
+FILES = (
+    ".github/workflows/benchmark.yml", "docs/ranking.md", "docs/leaderboard.md",
+    "docs/consistency.md",
+)  # fmt: skip
 
 
 def calls(file):

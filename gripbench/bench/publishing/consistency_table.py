@@ -21,6 +21,14 @@ NOTES = (
 )
 
 
+_OF_INNOVATIONS = (
+    Column("nis", "NIS", format=".3g"),
+    Column("nis_band", "Band of NIS"),
+    Column("white", "White"),
+)
+"""Columns where a filter shows its innovations."""
+
+
 def consistency_table(lines: pd.DataFrame, target: str, confidence: float) -> Table:
     """Return the lines of a target as a table, those of a plan or scenario together.
 
@@ -35,6 +43,8 @@ def consistency_table(lines: pd.DataFrame, target: str, confidence: float) -> Ta
     """
     shown = signal(target)
     unit = shown.display_unit.replace("-", "")
+    part = lines[lines["target"] == target]
+    notes = NOTES if part["nis"].notna().any() else NOTES[:1]
     columns = (
         Column("place", "Drives"),
         Column("label", "Method"),
@@ -45,13 +55,10 @@ def consistency_table(lines: pd.DataFrame, target: str, confidence: float) -> Ta
         Column("covered", "In 50/90/95 %"),
         Column("sharpness", "Width of 90 %", unit, ".3g"),
         Column("crps", "CRPS", unit, ".3g", best="lowest"),
-        Column("nis", "NIS", format=".3g"),
-        Column("nis_band", "Band of NIS"),
-        Column("white", "White"),
+        *(_OF_INNOVATIONS if part["nis"].notna().any() else ()),
     )
-    part = lines[lines["target"] == target]
     rows = tuple(_row(line, shown.display_factor) for line in part.to_dict("records"))
-    return Table(columns, rows, caption=f"Consistency: {target}", notes=NOTES, group_by="place")
+    return Table(columns, rows, caption=f"Consistency: {target}", notes=notes, group_by="place")
 
 
 def _row(line: Mapping[Any, Any], factor: float) -> dict[str, Any]:
