@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
+from gripbench.bench.catalogue.declarations import Declaration
 from gripbench.bench.publishing.figures.runs import Runs
 from gripbench.bench.publishing.figures.style import (
     TRUTH,
@@ -21,6 +23,7 @@ from gripbench.bench.publishing.figures.style import (
 from gripbench.bench.running.recorded_scenarios import log_window
 from gripbench.envs.signals import VARIANCE, difference, signal
 from gripbench.errors import InputError, unknown
+from gripbench.methods.outputs import quantile_field
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -117,10 +120,10 @@ def run_plot(
             scale * difference(name, estimates[name], truth[name][shown]), spec.label, look,
             index / len(methods),
         )  # fmt: skip
-        if name in spec.declaration.variances:
-            deviation = DEVIATIONS * scale * np.sqrt(np.maximum(estimates[name + VARIANCE], 0.0))
+        band = _stated_band(spec.declaration, estimates, name)
+        if band is not None:
             rows[0].fill_between(
-                time[shown], values - deviation, values + deviation, color=look.color, alpha=0.15,
+                time[shown], scale * band[0], scale * band[1], color=look.color, alpha=0.15,
                 linewidth=0.0, zorder=2,
             )  # fmt: skip
     rows[0].set_ylabel(axis_label(name))
@@ -134,3 +137,20 @@ def run_plot(
         title += f": run {window.run}, {window.start:.3f} to {window.end:.3f} s of the log's clock"
     figure.suptitle(title, fontsize=9.5, x=0.01, ha="left")
     return figure
+
+
+def _stated_band(
+    declaration: Declaration, estimates: npt.NDArray[Any], name: str
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]] | None:
+    """Return between what a method states that the signal lies; None: it states nothing.
+
+    By a variance 95 %, by quantiles from the lowest to the highest that it gives.
+    """
+    if name in declaration.variances:
+        reach = DEVIATIONS * np.sqrt(np.maximum(estimates[name + VARIANCE], 0.0))
+        return estimates[name] - reach, estimates[name] + reach
+    if name in declaration.quantiles:
+        levels = declaration.quantiles[name]
+        low, high = (quantile_field(name, level) for level in (levels[0], levels[-1]))
+        return estimates[low], estimates[high]
+    return None
