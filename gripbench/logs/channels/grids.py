@@ -12,10 +12,15 @@ FEWEST = 20
 """Cells that a comparison needs at least."""
 
 
+_GAP = 10.0  # usual distances between samples, and a second: across more nothing is known
+
+
 def on_grid(series: Sequence[Series], step: float) -> list[Floats] | None:
-    """Return the means of the series over the same cells of time, or None if these are too few."""
-    start = max(s.times[0] for s in series)
-    end = min(s.times[-1] for s in series)
+    """Return the means of the series over the same cells of time, or None if these are too few.
+
+    The cells are those of the longest stretch in which no series has a gap.
+    """
+    start, end = _longest_stretch(series)
     if not np.isfinite(end - start) or end - start > 1e7 * step:
         return None
     count = int((end - start) / step) - 1
@@ -32,6 +37,25 @@ def on_grid(series: Sequence[Series], step: float) -> list[Floats] | None:
         mean[averaged] = (total[last] - total[first])[averaged] / (last - first)[averaged]
         columns.append(mean)
     return columns
+
+
+def _longest_stretch(series: Sequence[Series]) -> tuple[float, float]:
+    """Return the longest interval [s] that all series fill."""
+    start = max(float(s.times[0]) for s in series)
+    end = min(float(s.times[-1]) for s in series)
+    gaps = []
+    for one in {id(s.times): s.times for s in series}.values():
+        steps = np.diff(one)
+        wide = (
+            np.flatnonzero(steps > max(1.0, _GAP * float(np.median(steps)))) if len(steps) else []
+        )
+        gaps += [(float(one[k]), float(one[k + 1])) for k in wide]
+    best, begin = (start, start), start
+    for low, high in [*sorted(gaps), (end, end)]:
+        if min(low, end) - begin > best[1] - best[0]:
+            best = begin, min(low, end)
+        begin = max(begin, high)
+    return best
 
 
 def without_trend(values: Floats, width: int) -> Floats:

@@ -59,6 +59,7 @@ class Draft:
     tables: dict[str, Entry]
     instruments: list[str] = field(default_factory=list)
     unknown: list[str] = field(default_factory=list)
+    left_out: dict[str, str] = field(default_factory=dict)
     extra: dict[str, dict[str, Any]] = field(default_factory=dict)
     vehicle: dict[str, dict[str, Any]] = field(default_factory=dict)
 
@@ -152,7 +153,7 @@ def text_of(made: Draft) -> str:
         lines += [f"{name} = {_toml(value)}" for name, value in made.vehicle.items()]
     if made.unknown:
         lines += ["", "# Columns that no signal was found for:"]
-        lines += [f"#   {_toml(name)}" for name in made.unknown]
+        lines += [f"#   {_toml(name)}{made.left_out.get(name, '')}" for name in made.unknown]
     return "\n".join(lines) + "\n"
 
 
@@ -179,6 +180,8 @@ def _add_columns(made: Draft, short: str, log: Log) -> None:
         guess = found.get(name)
         if guess is None or column.is_text or not np.isfinite(column.values).any():
             made.unknown.append(f"{short}: {name}" if short else name)
+            if guess is not None:
+                made.left_out[made.unknown[-1]] = _why_not(guess, column)
             continue
         table = "reference" if guess.reference or guess.signal in REFERENCE_ALWAYS else "channels"
         key = f"{table}.{guess.signal}"
@@ -194,6 +197,21 @@ def _add_columns(made: Draft, short: str, log: Log) -> None:
         made.tables[key] = entry
     for key, names in rivals.items():
         made.tables[key].reasons.append(f"taken before {', '.join(names[:5])}")
+
+
+def _why_not(guess: Guess, column: LogColumn) -> str:
+    """Return why a column that looks like a signal is none."""
+    words = [str(one) for one in column.values if isinstance(one, str) and not _number(one)]
+    held = f"it holds text such as {_toml(words[0][:20])}" if words else "it is blank"
+    return f": {guess.signal} by its name, but {held}"
+
+
+def _number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _entry(name: str, column: LogColumn, guess: Guess, log: Log) -> Entry | None:

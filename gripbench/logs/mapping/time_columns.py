@@ -14,6 +14,7 @@ from gripbench.logs.mapping.naming import guesses, is_time, written_unit
 from gripbench.logs.mapping.units import UNITS, proposed_unit
 from gripbench.logs.readers.log import Log, LogColumn
 
+_SERIAL_DAYS = (20_000.0, 80_000.0)  # of a spreadsheet: 1954 to 2119
 _KITTI_RATES = (10.0, 100.0)
 _DATE = re.compile(r"\s*\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}")
 _MOMENT = re.compile(r"\s*(\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}|\d{1,2}:\d{2})")
@@ -97,6 +98,8 @@ def _unit(log: Log, name: str, column: LogColumn) -> tuple[str, str]:
     filled = column.values[np.isfinite(column.values)]
     steps = np.diff(filled)
     usual = float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else 1.0
+    if _SERIAL_DAYS[0] < filled[0] < filled[-1] < _SERIAL_DAYS[1] and usual < 1.0 / 86400.0:
+        return "d", "no unit is written: days of a spreadsheet, less than a second apart"
     whole = bool(np.all(filled == np.round(filled)))
     if whole and usual >= 1.0 and len(log.columns) > 1:
         for unit, longest in (("ms", 1e3), ("us", 1e6), ("ns", 1e9)):

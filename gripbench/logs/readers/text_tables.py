@@ -82,9 +82,14 @@ def text_of(path: Path) -> str:
             text = data.decode("cp1252", errors="replace")
     if _ODD.search(text[:100_000]) or text[:1000].count("\ufffd") > 20:
         raise InputError(f"{path}: is no text, it may be damaged or of another format")
+    text = text.replace("\u2212", "-")  # the typographic minus
     if "\r" in text:
         text = text.replace("\r\n", "\n").replace("\r", "\n")
     return text
+
+
+_FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[-+]?\d+$)")
+"""The letter before the exponent of a double in Fortran."""
 
 
 def parse_table(path: Path, text: str, file: LogFile, wanted: frozenset[str] | None) -> Content:
@@ -242,6 +247,7 @@ def _values(
     cells = pd.Series(column.to_pylist(), dtype=object).str.strip()
     cells = cells.where(~cells.str.lower().isin(MISSING | {""}), None)
     plain = cells.str.replace(",", ".", regex=False) if file.decimal == "," else cells
+    plain = plain.str.replace(_FORTRAN, "e", regex=True)
     numbers = pd.to_numeric(plain, errors="coerce").to_numpy(dtype=np.float64)
     filled = cells.notna().to_numpy()
     words = filled & np.isnan(numbers)
