@@ -1,5 +1,7 @@
 """Which method to take: the words above a board and the table for roads and sensors."""
 
+import csv
+import io
 import xml.etree.ElementTree as ElementTree
 
 import numpy as np
@@ -9,10 +11,11 @@ from synthetic_rows import GPS, IDEAL, TORQUE, noisy_frame, noisy_rows, row
 from typer.testing import CliRunner
 
 from gripbench.bench.command_line import application
-from gripbench.bench.publishing.board_tables import answer_table, board_table
+from gripbench.bench.publishing.board_tables import answer_table, board_table, one_table
 from gripbench.bench.publishing.leaderboard import build, text_of
 from gripbench.bench.publishing.report.content import found_boards, profile
 from gripbench.bench.publishing.report.critical import critical_differences
+from gripbench.bench.publishing.tables import csv as csv_text
 from gripbench.bench.publishing.tables import plain
 from gripbench.bench.ranking.answers import answers, words
 from gripbench.bench.ranking.grids import PRODUCTION, instruments
@@ -114,6 +117,19 @@ def test_angles_are_shown_in_degrees():
     shown = board_table(board).rows[0]["rms"]
     assert shown == pytest.approx(np.rad2deg(board.lines.loc[0, "rms"]))
     assert " deg RMS" in words(board)
+
+
+def test_one_table_of_boards_names_the_unit_of_each():
+    angle = {"target": "sideslip"}
+    frame = noisy_frame({"a": 1.0, "b": 2.0, "c": 0.1, "d": 0.2}, c=angle, d=angle)
+    lines = csv.DictReader(io.StringIO(csv_text(one_table(boards(frame)))))
+    found = {line["Method"]: (line["Target"], line["Unit"], float(line["RMS"])) for line in lines}
+    assert found["a"][:2] == ("mu_front", "-")
+    assert found["c"][:2] == ("sideslip", "deg")
+    board = next(board for board in boards(frame) if board.target == "sideslip")
+    assert found["c"][2] == pytest.approx(
+        np.rad2deg(board.lines.set_index("label").loc["c", "rms"])
+    )
 
 
 def test_the_critical_differences_join_what_ties_and_nothing_else():

@@ -113,3 +113,8 @@ def test_epochs_in_another_unit_are_refused(frame, unit, factor):
 def test_milliseconds_from_zero_taken_for_seconds_are_noticed(frame):
     (finding,) = _report(frame.assign(t=1000.0 * frame["t"]), MAP)
     assert finding.suggestion == 'time: unit = "ms"'
+
+
+def test_a_gap_of_the_log_is_not_taken_for_a_clock(frame):
+    holed = frame[~frame["t"].between(10.0, 20.0)]
+    assert not _report(holed, MAP)

@@ -1,6 +1,8 @@
 """Tables of text as loggers and tools write them give the same columns as the plain one."""
 
 import gzip
+import re
+import tomllib
 
 import numpy as np
 import pytest
@@ -231,3 +233,40 @@ def test_vbox(tmp_path):
     np.testing.assert_allclose(seen["speed_gps"], [20.0, 10.0])
     np.testing.assert_allclose(seen["course"], np.deg2rad([-90.0, -180.0]))
     np.testing.assert_allclose(seen["yaw_rate"], np.deg2rad([1.0, -2.0]))
+
+
+def _handling(tmp_path, change=lambda text: text, time="time_s"):
+    """Return a file of speed, lateral acceleration and yaw rate, as text that was changed."""
+    t = np.arange(0.0, 20.0, 0.01)
+    rate = 0.3 * np.sin(1.3 * t)
+    days = 45_000.0 + t / 86_400.0 if time == "Time" else t
+    lines = [f"{time},speed_kmh,yawrate_degs,latacc_g"]
+    lines += [
+        f"{a:.12g},{72.0:.3f},{np.rad2deg(b):.6e},{20.0 * b / 9.81:.6e}"
+        for a, b in zip(days, rate, strict=True)
+    ]
+    path = tmp_path / "drive.csv"
+    path.write_text(change("\n".join(lines) + "\n"), encoding="utf-8")
+    return path, rate
+
+
+@pytest.mark.parametrize(
+    "change",
+    [lambda text: text.replace("-", "\u2212"), lambda text: re.sub(r"e(?=[-+]\d)", "D", text)],
+)
+def test_typographic_minus_and_exponents_of_fortran_are_numbers(tmp_path, change):
+    path, rate = _handling(tmp_path, change)
+    log = read_log(path, LogFile(path=path.name))
+    np.testing.assert_allclose(log.columns["yawrate_degs"].values, np.rad2deg(rate), atol=1e-4)
+    assert tomllib.loads(inspect_log(path).proposal)["channels"].keys() >= {"yaw_rate", "accel_y"}
+
+
+def test_days_of_a_spreadsheet_are_no_seconds(tmp_path):
+    path, _ = _handling(tmp_path, time="Time")
+    assert tomllib.loads(inspect_log(path).proposal)["time"]["unit"] == "d"
+
+
+def test_a_signal_whose_column_holds_text_is_named_with_the_reason(tmp_path):
+    path, _ = _handling(tmp_path, lambda text: re.sub(r"(?m)^([^t][^,]*,[^,]*),", r"\1,~", text))
+    proposal = inspect_log(path).proposal
+    assert '"yawrate_degs": yaw_rate by its name, but it holds text such as "~' in proposal

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -239,23 +240,32 @@ def _where(one: Answer) -> list[str]:
 
 
 def one_table(boards: Sequence[Board], wide: bool = False) -> Table:
-    """Return boards under each other in one table, each line with plan, target and sensors."""
+    """Return boards under each other in one table, each line with plan, target and sensors.
+
+    Where boards show a column in different units, the target's unit is in a column of its own.
+    """
     parts = [board_table(board, wide=wide) for board in boards]
-    columns = {column.key: column for part in parts for column in part.columns}
-    first = (Column("plan", "Plan"), Column("target", "Target"), Column("sensors", "Sensors"))
+    columns: dict[str, Column] = {}
+    for part in parts:
+        for column in part.columns:
+            known = columns.setdefault(column.key, column)
+            if known.unit != column.unit:
+                columns[column.key] = replace(known, unit="")
+    first = {key: Column(key, key.capitalize()) for key in ("plan", "target", "unit", "sensors")}
     rows = [
         dict.fromkeys(columns)
         | dict(row)
         | {
             "plan": plan_of(board.scenarios[0]) if board.scenarios else "",
             "target": board.target,
+            "unit": signal(board.target).display_unit,
             "sensors": ", ".join(board.sensors) or "any",
         }
         for board, part in zip(boards, parts, strict=True)
         for row in part.rows
     ]
-    kept = tuple(column for key, column in columns.items() if key not in ("target", "sensors"))
-    return Table((*first, *kept), tuple(rows))
+    kept = tuple(column for key, column in columns.items() if key not in first)
+    return Table((*first.values(), *kept), tuple(rows))
 
 
 def _count(number: int, thing: str) -> str:
