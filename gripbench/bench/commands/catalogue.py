@@ -24,6 +24,7 @@ class Kind(StrEnum):
     POPULATIONS = "populations"
     CAUSES = "causes"
     INSTRUMENTS = "instruments"
+    EQUATIONS = "equations"
 
 
 def register(app: typer.Typer) -> None:
@@ -42,6 +43,11 @@ def _methods() -> None:
 
 def list_kind(kind: Annotated[Kind, typer.Argument(help="What to list.")]) -> None:
     """List scenarios, methods, vehicles, populations, causes, instruments..."""
+    if kind is Kind.EQUATIONS:
+        from gripbench.bench.publishing.equation_pages import equation_lines
+
+        _print(*equation_lines())
+        return
     from gripbench.bench.catalogue.listing import listing
 
     _print(*listing(kind.value))

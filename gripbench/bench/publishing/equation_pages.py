@@ -72,23 +72,27 @@ def equations_page() -> str:
         "Read from the docstrings of methods, plants and tyres when this page is built. The same "
         "docstrings say which printed equation was corrected, and why.\n",
     ]
-    every = places()
+    columns = (Column("equation", "Eq."), Column("function", "In"), Column("file", "File"))
     for paper in PAPERS:
-        of_paper = [place for place in every if place.paper == paper]
-        # a module's summary is named where no function of it holds the equation
-        held = {(place.equation, place.path) for place in of_paper if place.name}
-        rows = [
-            {
-                "equation": f"({place.equation})",
-                "function": place.name if place.name else "the module",
-                "file": f"gripbench/{place.path}",
-            }
-            for place in of_paper
-            if place.name or (place.equation, place.path) not in held
-        ]
-        columns = (Column("equation", "Eq."), Column("function", "In"), Column("file", "File"))
-        parts += [f"## {paper}\n", markdown(Table(columns, tuple(rows), "")), ""]
+        rows = tuple(
+            dict(zip(("equation", "function", "file"), line[1:], strict=True))
+            for line in equation_lines()[1]
+            if line[0] == paper
+        )
+        parts += [f"## {paper}\n", markdown(Table(columns, rows, "")), ""]
     return "\n".join(parts)
+
+
+def equation_lines() -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Return header and lines of the index: paper, equation, function and file."""
+    # a module's summary is named where no function of it holds the equation
+    held = {(place.paper, place.equation, place.path) for place in places() if place.name}
+    lines = [
+        (place.paper, f"({place.equation})", place.name or "the module", f"gripbench/{place.path}")
+        for place in places()
+        if place.name or (place.paper, place.equation, place.path) not in held
+    ]
+    return ("paper", "equation", "in", "file"), lines
 
 
 def _of_module(path: Path, name: str) -> Iterator[Place]:
