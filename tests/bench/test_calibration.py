@@ -100,7 +100,7 @@ def test_innovations_are_tested_against_their_own_variance(rows):
     line = lines.loc["watched"]
     assert line["nis_verdict"].startswith("overconfident")
     assert line["innovation_correlation"] > 0.5
-    assert line["white_innovations"] == 0.0
+    assert line["white_innovations"] < 0.3
     assert lines.drop(index="watched")["nis"].isna().all()
 
 
