@@ -26,6 +26,7 @@ from gripbench.envs.gym.registration import register_with_gymnasium
 if TYPE_CHECKING:
     from gripbench.bench.catalogue.check import check_estimator
     from gripbench.bench.catalogue.registry import register
+    from gripbench.bench.ranking.consistency import consistency
     from gripbench.bench.ranking.ranking import rank
     from gripbench.bench.ranking.summary import summary
     from gripbench.bench.running.api import run
@@ -67,6 +68,7 @@ DEFINED_IN = {
     "Variant": "gripbench.methods.contract",
     "check_estimator": "gripbench.bench.catalogue.check",
     "compiled": "gripbench.methods.contract",
+    "consistency": "gripbench.bench.ranking.consistency",
     "load_scenario": "gripbench.envs.worlds",
     "rank": "gripbench.bench.ranking.ranking",
     "read_rows": "gripbench.bench.running.store",
@@ -88,6 +90,7 @@ __all__ = [
     "Variant",
     "check_estimator",
     "compiled",
+    "consistency",
     "load_scenario",
     "rank",
     "read_rows",

@@ -14,11 +14,12 @@ from typing import Any
 
 import pandas as pd
 
+from gripbench.bench.ranking.degradation import without_faults
 from gripbench.bench.ranking.method_lines import tested, uncertainty
 from gripbench.bench.ranking.plans import plan_of
 from gripbench.bench.scoring.consistency import RunsTest
 from gripbench.bench.scoring.metrics import metrics
-from gripbench.errors import InputError
+from gripbench.errors import InputError, unknown
 
 POOLED = (
     "crps", "coverage_50", "coverage_90", "coverage_95", "sharpness", "innovation_correlation",
@@ -35,18 +36,18 @@ COLUMNS = (
 
 def consistency(
     rows: pd.DataFrame,
-    targets: Iterable[str],
+    target: str | Iterable[str] = (),
     by_scenario: bool = False,
     confidence: float = 0.95,
 ) -> pd.DataFrame:
-    """Return one line a target, plan (or scenario) and method, with `COLUMNS`.
+    """Say of each method whether its errors are as large as it says.
 
     Parameters
     ----------
     rows
-        Frame as `gripbench.bench.running.rows.frame_of` returns it.
-    targets
-        Signals that are estimated.
+        Frame as `gripbench.run` or `gripbench.read_rows` returns it.
+    target
+        Signal or signals that are estimated; empty: all.
     by_scenario
         Whether each scenario has lines of its own; else a plan's scenarios are pooled, and the
         runs of one seed are one.
@@ -55,19 +56,26 @@ def consistency(
 
     Returns
     -------
-    `verdict` is consistent, overconfident or cautious by a factor, `says nothing` for a method
-    that states no uncertainty, `n/a` where a run failed or lacks a value. `factor` is the ratio of
-    the errors to the stated deviation with its interval, `nees_low` and `nees_high` the band of a
-    consistent filter; `nis...` are the same of the innovations, empty where none are shown.
+    One line a target, plan (or scenario) and method, with `COLUMNS`. `verdict` is consistent,
+    overconfident or cautious by a factor, `says nothing` for a method that states no uncertainty,
+    `n/a` where a run failed or lacks a value. `factor` is the ratio of the errors to the stated
+    deviation with its interval, `nees_low` and `nees_high` the band of a consistent filter;
+    `nis...` are the same of the innovations, empty where none are shown. Runs with faults count in
+    scenarios of their own alone.
 
     Raises
     ------
     InputError
-        If `confidence` is not between 0.5 and 1.
+        If `confidence` is not between 0.5 and 1, or no row has a target.
     """
     if not 0.5 <= confidence < 1.0:
         raise InputError(f"confidence is {confidence:g}; it must be from 0.5 to below 1")
-    chosen = list(targets)
+    rows = rows if by_scenario else without_faults(rows)
+    known = [str(name) for name in rows["target"].unique() if name]
+    chosen = ([target] if isinstance(target, str) else list(target)) or known
+    for name in chosen:
+        if name not in known:
+            raise unknown("target", name, known)
     ran = rows[(rows["status"] != "skipped") & rows["target"].isin(chosen)]
     ran = ran.assign(plan=[plan_of(str(name)) or str(name) for name in ran["scenario"]])
     lines: list[dict[str, Any]] = []
