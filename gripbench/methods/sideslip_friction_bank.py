@@ -16,6 +16,10 @@ friction with a filter of its own over
   excited: the variance of the friction then says that it is not known.
 - The longitudinal speed comes from `blocks.speed_fusion`; braking and traction take their share of
   the friction ellipse and move the load.
+
+Of its variance: offset, stiffness and steering zero are states, so it is nearly consistent for the
+sideslip. The friction's is too small where a bank of the road is explained by a slide, and under
+uneven friction left and right, which is no hypothesis.
 """
 
 from __future__ import annotations
