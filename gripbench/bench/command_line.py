@@ -72,7 +72,7 @@ def main() -> None:
         usage = getattr(error, "format_message", None)
         if usage is None:
             raise
-        message = " ".join(usage().split())
+        message = " ".join(usage().split()).replace("Value error, ", "")  # a library's own words
         if not message or "no_args" in type(error).__name__.lower():
             error.show()  # type: ignore[attr-defined]
             sys.exit(2)

@@ -75,6 +75,8 @@ class Parameter:
                 raise InputError(f"{name}; it is a switch: allowed is 0 (no) or 1 (yes)")
             return bool(value)
         if not (number and self.low <= value <= self.high):
+            if not number and np.isinf([self.low, self.high]).all():
+                raise InputError(f"{name}; give a number")
             raise InputError(f"{name}; allowed is {self.low:g} to {self.high:g} {self.unit}")
         if self.is_integer:
             if value != int(value):

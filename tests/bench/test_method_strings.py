@@ -2,7 +2,7 @@
 
 import pytest
 
-from gripbench.bench.catalogue.declarations import make
+from gripbench.bench.catalogue.making import make
 from gripbench.bench.catalogue.registry import choose_method, split_choice
 from gripbench.bench.catalogue.templates import write_method
 from gripbench.errors import InputError

@@ -17,7 +17,7 @@ from typing import Any
 import numpy.typing as npt
 
 from gripbench.bench.catalogue.arrays import given_state
-from gripbench.bench.catalogue.declarations import Declaration, declaration_of, make
+from gripbench.bench.catalogue.declarations import Declaration, declaration_of
 from gripbench.bench.catalogue.expectations import (
     CHECKS,
     FIRST,
@@ -26,6 +26,7 @@ from gripbench.bench.catalogue.expectations import (
     Perform,
     Subject,
 )
+from gripbench.bench.catalogue.making import make
 from gripbench.bench.catalogue.registry import (
     MethodSpec,
     choose_method,
@@ -34,7 +35,7 @@ from gripbench.bench.catalogue.registry import (
     split_choice,
 )
 from gripbench.bench.catalogue.scenarios import all_scenario_files, find_scenario
-from gripbench.bench.running.execution import missing
+from gripbench.bench.running.execution import missing, takes_samples
 from gripbench.bench.running.fitting import fitted
 from gripbench.bench.running.isolation.limits import CellFailure, Limits
 from gripbench.bench.running.isolation.loading import Settings
@@ -117,7 +118,13 @@ def check_estimator(
             return results
         recordings, period = _recordings(tried.declaration, tuple(scenarios), seed)
         subject = Subject(
-            tried.perform, tried.bounded, tried.declaration, tried.batch, recordings, period
+            tried.perform,
+            tried.bounded,
+            tried.declaration,
+            tried.batch,
+            tried.online,
+            recordings,
+            period,
         )
         results = {}
         for name in wanted:
@@ -135,6 +142,7 @@ class _Tried:
     bounded: Perform | None
     declaration: Declaration
     batch: bool
+    online: bool
     expected: dict[str, str]
 
 
@@ -164,7 +172,8 @@ def _tried(
         return perform(form, Trial(create, declaration, vehicle, observations, period))
 
     expected = dict(getattr(instance, "expected_failures", {}))
-    return _Tried(here, None, declaration, has_batch(instance), expected)
+    online = takes_samples(instance)
+    return _Tried(here, None, declaration, has_batch(instance), online, expected)
 
 
 def _in_sandbox(name: str, settings: Settings, limits: Limits, stack: ExitStack) -> _Tried:
@@ -180,6 +189,7 @@ def _in_sandbox(name: str, settings: Settings, limits: Limits, stack: ExitStack)
         partial(bounded.perform, settings),
         loaded.declaration,
         loaded.batch,
+        loaded.online,
         loaded.expected_failures,
     )
 

@@ -16,6 +16,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, Literal
 
+from gripbench.bench.catalogue.making import make
 from gripbench.bench.catalogue.training import checked_training, training_of
 from gripbench.envs.signals import SIGNALS, signal
 from gripbench.errors import (
@@ -29,7 +30,6 @@ from gripbench.errors import (
 )
 from gripbench.methods.contract import CompiledMethod
 from gripbench.methods.outputs import checked_quantiles, fields_of
-from gripbench.methods.settings import Variant
 
 
 @dataclass(frozen=True)
@@ -110,57 +110,6 @@ class Source:
         return make(self.load(), variant, parameters, self.target)
 
 
-def make(factory: Any, variant: str, parameters: Mapping[str, Any], name: str) -> Any:
-    """Return a new estimator of a class, or an instance as it is."""
-    arguments = dict(parameters)
-    if not callable(factory):  # an instance carries its settings already
-        if arguments or variant:
-            raise InputError(f"{name}: an instance takes no variant or parameters any more")
-        return factory
-    try:
-        known = inspect.signature(factory).parameters
-    except (TypeError, ValueError):
-        known = inspect.signature(lambda **_: None).parameters
-    flexible = any(item.kind is item.VAR_KEYWORD for item in known.values())
-    if variant and ("variant" in known or flexible):
-        arguments["variant"] = variant
-    elif variant:
-        arguments = {**_settings_of(factory, variant, name), **arguments}
-    for key, value in arguments.items():
-        if key not in known and not flexible:
-            raise InputError(f"{name}: it takes no parameter '{key}': {nearest(key, known)}")
-        if key in known:
-            arguments[key] = _as_default(value, known[key].default)
-    return factory(**arguments)
-
-
-def _settings_of(factory: Any, variant: str, name: str) -> Mapping[str, Any]:
-    """Return the arguments of a variant that a plain class lists in `variants`."""
-    variants = getattr(factory, "variants", None)
-    if not isinstance(variants, Mapping) or not variants:
-        raise InputError(f"{name}: it takes no variant")
-    if variant not in variants:
-        raise unknown(f"variant of {name}", variant, variants)
-    found = variants[variant]
-    settings = found.settings if isinstance(found, Variant) else found
-    if not isinstance(settings, Mapping):
-        raise InputError(f"{name}: variant '{variant}' must be a table of parameter values")
-    return settings
-
-
-def _as_default(value: Any, default: Any) -> Any:
-    """Return a number in the type of a parameter's default: whole, real, or yes and no."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return value
-    if isinstance(default, bool):
-        return bool(value) if value in (0, 1) else value
-    if isinstance(default, float):
-        return float(value)
-    if isinstance(default, int) and float(value).is_integer():
-        return int(value)
-    return value
-
-
 def declaration_of(
     method: Any, variant: str = "", parameters: Mapping[str, Any] = {}
 ) -> Declaration:
@@ -182,7 +131,8 @@ def declaration_of(
     given = {item: getattr(method, item, None) for item in _READ}
     name = given["name"] if isinstance(given["name"], str) else type(method).__name__
     for function in ("reset", "update"):
-        if not callable(getattr(method, function, None)):
+        whole = callable(getattr(method, "run", None)) and not hasattr(method, "update")
+        if not whole and not callable(getattr(method, function, None)):
             raise InputError(f"{name}: add the method '{function}' (see 'gripbench new method')")
     if compiled:
         check_names(f"{name}: 'parameters'", [item.name for item in method.parameters])
@@ -384,9 +334,7 @@ def _class_in(module: ModuleType, name: str, path: Path) -> Any:
     methods = {
         key: value
         for key, value in vars(module).items()
-        if inspect.isclass(value)
-        and value.__module__ == module.__name__
-        and all(callable(getattr(value, item, None)) for item in ("update", "reset"))
+        if inspect.isclass(value) and value.__module__ == module.__name__ and _may_be_method(value)
     }
     if name:
         if not hasattr(module, name):
@@ -396,3 +344,10 @@ def _class_in(module: ModuleType, name: str, path: Path) -> Any:
         found = ", ".join(sorted(methods)) or "none"
         raise InputError(f"{path}: name the class, as in {path.name}:MyFilter (found: {found})")
     return next(iter(methods.values()))
+
+
+def _may_be_method(kind: type) -> bool:
+    """Return whether a class takes samples one by one, or declares itself and takes recordings."""
+    if callable(getattr(kind, "update", None)):
+        return callable(getattr(kind, "reset", None))
+    return callable(getattr(kind, "run", None)) and hasattr(kind, "estimates")

@@ -15,6 +15,7 @@ from gripbench.bench.catalogue import distortions
 from gripbench.bench.catalogue.declarations import Declaration
 from gripbench.bench.running.execution import ONLINE_SAMPLES
 from gripbench.bench.running.isolation.limits import CellFailure
+from gripbench.bench.scoring.scoring import missing_at_first
 from gripbench.envs.recordings import Recording
 from gripbench.envs.signals import VARIANCE, difference
 from gripbench.methods.outputs import quantile_field
@@ -39,6 +40,10 @@ Perform = Callable[[str, dict[str, float], npt.NDArray[Any], float], list[npt.ND
 """Makes a trial of a method: form, vehicle, observations, sample time; see `trials.FORMS`."""
 
 
+_ONE_BY_ONE = ("online", "reset", "reused")
+"""Forms of trials that give samples one by one."""
+
+
 @dataclass
 class Subject:
     """A method and what it is checked with; every trial is made once."""
@@ -47,6 +52,7 @@ class Subject:
     bounded: Perform | None
     declaration: Declaration
     batch: bool
+    online: bool
     recordings: tuple[Recording, ...]
     period: float
     made: dict[tuple[str, bytes], list[npt.NDArray[Any]] | Exception] = field(default_factory=dict)
@@ -71,6 +77,8 @@ class Subject:
         self, form: str, observations: npt.NDArray[Any], vehicle: dict[str, float] | None = None
     ) -> list[npt.NDArray[Any]]:
         """Make a trial, or find again what came of it."""
+        if form in _ONE_BY_ONE and not self.online:
+            raise NotApplicableError("it has no update: it takes whole recordings")
         vehicle = self.vehicle if vehicle is None else vehicle
         content = hashlib.sha256(observations.tobytes() + repr(vehicle).encode()).digest()
         if (form, content) not in self.made:
@@ -92,7 +100,8 @@ def _declares_its_channels(subject: Subject) -> None:
 def _reads_only_its_channels(subject: Subject) -> None:
     # Neither form is given more than the declared channels: reading another one raises.
     subject.estimates(subject.observations)
-    subject.trial("online", subject.observations[:200])
+    if subject.online:
+        subject.trial("online", subject.observations[:200])
 
 
 def _reset_equals_fresh(subject: Subject) -> None:
@@ -129,7 +138,8 @@ def _reads_within_bounds(subject: Subject) -> None:
     if subject.bounded is None:
         raise NotApplicableError("only a method in a file of its own is compiled again for it")
     try:
-        subject.bounded("online", subject.vehicle, subject.observations[:500], subject.period)
+        form = "online" if subject.online else "run"
+        subject.bounded(form, subject.vehicle, subject.observations[:500], subject.period)
     except CellFailure as error:
         if "IndexError" in str(error):
             raise ExpectationError(
@@ -191,8 +201,8 @@ def _quantiles_in_order(subject: Subject) -> None:
 
 
 def _online_and_batch_agree(subject: Subject) -> None:
-    if not subject.batch:
-        raise NotApplicableError("it has no batch form")
+    if not subject.batch or not subject.online:
+        raise NotApplicableError("it has one form only")
     batch = subject.estimates(subject.observations)
     (online,) = subject.trial("online", subject.observations)
     for name in subject.declaration.outputs:
@@ -229,14 +239,19 @@ def _same(first: npt.NDArray[Any], second: npt.NDArray[Any], message: str) -> No
 
 
 def _all_finite(subject: Subject, estimates: npt.NDArray[Any]) -> bool:
-    return all(np.isfinite(estimates[name]).all() for name in subject.declaration.outputs)
+    return all(_said_finite(estimates[name]).all() for name in subject.declaration.outputs)
+
+
+def _said_finite(values: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
+    """Return which estimates are finite, or stand before the first one."""
+    return np.isfinite(values) | (np.arange(len(values)) < missing_at_first(values))
 
 
 def _finite(
     subject: Subject, estimates: npt.NDArray[Any], observations: npt.NDArray[Any], where: str
 ) -> None:
     for name in subject.declaration.outputs:
-        finite = np.isfinite(estimates[name])
+        finite = _said_finite(estimates[name])
         if not finite.all():
             first = int(np.argmin(finite))
             time = float(observations["time"][first])

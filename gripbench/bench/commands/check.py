@@ -43,6 +43,10 @@ def check(
         ),
     ] = "",
     memory_limit: Annotated[float, typer.Option(help="MiB that it may take.")] = 2048.0,
+    show_output: Annotated[
+        bool,
+        typer.Option("--show-output", help="Show on standard error what a method of yours prints."),
+    ] = False,
     results: Annotated[
         Path, typer.Option(help="Folder of the stored rows, beside which the result is kept.")
     ] = DEFAULT_RESULTS,
@@ -68,7 +72,7 @@ def check(
             method,
             scenario or (),
             checks=only or (),
-            limits=limits_of(time_limit, memory_limit),
+            limits=limits_of(time_limit, memory_limit, show_output),
             on_result=on_result,
         )
     out.print(tally(found), markup=False, highlight=False)

@@ -95,6 +95,10 @@ def run(
     memory_limit: Annotated[
         float, typer.Option(help="MiB that a method of yours may take.")
     ] = 2048.0,
+    show_output: Annotated[
+        bool,
+        typer.Option("--show-output", help="Show on standard error what a method of yours prints."),
+    ] = False,
     results: Annotated[Path, typer.Option(help="Folder of the stored rows.")] = DEFAULT_RESULTS,
     export: Annotated[
         Path | None, typer.Option(help="Also write the scores, without runtimes, as CSV.")
@@ -141,7 +145,7 @@ def run(
                 plan,
                 Store(results),
                 Backend(backend, workers, scheduler),
-                limits_of(time_limit, memory_limit),
+                limits_of(time_limit, memory_limit, show_output),
                 fresh,
                 on_row,
             )

@@ -12,7 +12,8 @@ from gripbench.bench.papers.reproduction import Reproduction, reproduction_of
 from gripbench.bench.publishing import tables
 from gripbench.bench.publishing.columns import Table
 from gripbench.bench.publishing.manifest import manifest, write_manifest
-from gripbench.errors import GripbenchError
+from gripbench.envs.hidden_draws import VARIABLE, salt
+from gripbench.errors import GripbenchError, InputError
 from gripbench.writing import write_atomically
 
 
@@ -33,10 +34,12 @@ def reproduce_paper(paper: str, directory: Path) -> list[str]:
     Raises
     ------
     InputError
-        If there is no such paper or its file has a mistake.
+        If there is no such paper, its file has a mistake, or seeds are hidden.
     GripbenchError
         If the directory cannot be written.
     """
+    if salt():
+        raise InputError(f"{paper}: its numbers are of public seeds: unset {VARIABLE}")
     module = reproduction_of(paper)
     module.load()  # a mistake in the file is named before anything is written
     _make(directory)

@@ -12,12 +12,14 @@ import pandas as pd
 
 from gripbench.bench.publishing.columns import Column, Table
 from gripbench.bench.publishing.consistency_table import uncertainty_columns, uncertainty_note
+from gripbench.bench.publishing.initials import initial, instruments_of
 from gripbench.bench.publishing.timings import RelativeRuntime
 from gripbench.bench.ranking.answers import Answer
 from gripbench.bench.ranking.marks import (
     FOOTNOTE,
     MARKED_BY,
     OUTSIDE_FOOTNOTE,
+    PREFIX_FOOTNOTE,
     marked,
     training_note,
 )
@@ -130,6 +132,7 @@ def _notes(board: Board, wide: bool) -> tuple[str, ...]:
         f"{_count(len(board.scenarios), 'scenario')}, "
         f"{_count(max(len(board.seeds), 1), 'common seed')}. A score that "
         "is marked may be the best; ranks in brackets hold together.",
+        *([board.hiding] if board.hiding else []),
         *board.notes,
     ]
     if not wide and board.by == "crps":
@@ -150,8 +153,10 @@ def _notes(board: Board, wide: bool) -> tuple[str, ...]:
             for line in failed.to_dict("records")
         ]
         if not board.sensors:
-            used = sorted({name for reads in board.lines["reads"] for name in _instruments(reads)})
-            notes.append("Reads: " + ", ".join(f"{_initial(name)} {name}" for name in used) + ".")
+            used = sorted(
+                {name for reads in board.lines["reads"] for name in instruments_of(reads)}
+            )
+            notes.append("Reads: " + ", ".join(f"{initial(name)} {name}" for name in used) + ".")
     if board.lines["baseline"].any():
         notes.append(f"{GUESS} baseline: a guess or a formula on paper.")
     if board.lines["idealised"].any():
@@ -160,6 +165,8 @@ def _notes(board: Board, wide: bool) -> tuple[str, ...]:
         notes.append(OUTSIDE_FOOTNOTE + ".")
     for line in board.lines[board.lines["training"] != ""].to_dict("records"):
         notes.append(training_note(line["label"], line["training"], line["training_time"]) + ".")
+    if board.lines["over_prefixes"].any():
+        notes.append(PREFIX_FOOTNOTE + ".")
     return tuple(notes)
 
 
@@ -168,29 +175,6 @@ NOT_BETTER = "–"
 
 GUESS = "○"
 """Follows the name of a baseline."""
-
-_INITIALS = {
-    "wheel speed sensor": "W",
-    "torque on the vehicle bus": "T",
-    "accelerometer": "A",
-    "gyroscope": "G",
-    "steering angle sensor": "S",
-    "GPS receiver": "P",
-    "magnetometer": "M",
-    "optical speed sensor": "O",
-    "road grade estimate": "E",
-    "road bank map": "B",
-    "idealised": "†",
-}
-"""Letters of instruments in a narrow table."""
-
-
-def _instruments(reads: str) -> list[str]:
-    return [name for name in reads.split(", ") if name]
-
-
-def _initial(instrument: str) -> str:
-    return _INITIALS.get(instrument, instrument[:1].lower())
 
 
 def answer_table(found: Iterable[Answer]) -> Table:
@@ -251,7 +235,9 @@ def one_table(boards: Sequence[Board], wide: bool = False) -> Table:
             known = columns.setdefault(column.key, column)
             if known.unit != column.unit:
                 columns[column.key] = replace(known, unit="")
-    first = {key: Column(key, key.capitalize()) for key in ("plan", "target", "unit", "sensors")}
+    first = {
+        key: Column(key, key.capitalize()) for key in ("plan", "target", "unit", "sensors", "drawn")
+    }
     rows = [
         dict.fromkeys(columns)
         | dict(row)
@@ -260,6 +246,7 @@ def one_table(boards: Sequence[Board], wide: bool = False) -> Table:
             "target": board.target,
             "unit": signal(board.target).display_unit,
             "sensors": ", ".join(board.sensors) or "any",
+            "drawn": "from hidden seeds" if board.salt else "from public seeds",
         }
         for board, part in zip(boards, parts, strict=True)
         for row in part.rows
@@ -314,7 +301,7 @@ def _row(line: Mapping[Any, Any], target: str, timings: Timings, format_: str) -
         "place": _place(line),
         "nees_band": _range(line["nees_low"], line["nees_high"], ".2f"),
         "percent_90": _percent(line["coverage_90"]),
-        "initials": "".join(sorted(map(_initial, _instruments(line["reads"])))),
+        "initials": "".join(sorted(map(_initial, instruments_of(line["reads"])))),
         "beats_guess": _times(line["beats_guess"], 100.0),
         "beats_next": _times(line["beats_next"], 100.0),
         "elsewhere": _range(line["elsewhere_from"], line["elsewhere_to"], ".3f"),

@@ -25,7 +25,7 @@ from gripbench.bench.publishing.tables import markdown
 from gripbench.bench.publishing.timings import RelativeRuntime
 from gripbench.bench.ranking.answers import Answer, answers, words
 from gripbench.bench.ranking.degradation import degradation, without_faults
-from gripbench.bench.ranking.grids import ANY, opening
+from gripbench.bench.ranking.grids import ANY, opening, salts_of
 from gripbench.bench.ranking.plans import setting_of, standing_of
 from gripbench.bench.ranking.ranking import Board, boards
 from gripbench.bench.ranking.statistics import CONFIDENCE
@@ -49,6 +49,8 @@ class Runs(Configuration):
         Of the runs that are `ok`.
     failed
         Seeds of the others, with status and reason.
+    salt
+        Digest of the secret that they were drawn with; empty: none.
     """
 
     scenario: str
@@ -58,6 +60,7 @@ class Runs(Configuration):
     sums_of_squares: tuple[float, ...]
     counts: tuple[int, ...]
     failed: dict[int, str] = Field(default_factory=dict)
+    salt: str = ""
 
 
 class Leaderboard(Configuration):
@@ -309,6 +312,7 @@ def _content(board: Board) -> dict[str, Any]:
         "scenarios": list(board.scenarios),
         "seeds": list(board.seeds),
         "notes": list(board.notes),
+        "salt": board.salt,
         "methods": _lines(board.lines),
     }
 
@@ -343,6 +347,7 @@ def runs_of(rows: pd.DataFrame) -> list[Runs]:
                 seeds=tuple(int(seed) for seed in good["seed"]),
                 sums_of_squares=tuple(float(value) for value in good["sum_of_squares"]),
                 counts=tuple(int(value) for value in good["count"]),
+                salt=next(iter(salts_of(group)), ""),
                 failed={
                     int(seed): f"{status}: {reason}".removesuffix(": ")
                     for seed, status, reason in zip(

@@ -13,6 +13,7 @@ from gripbench.bench.ranking.marks import (
     FOOTNOTE,
     MARKED_BY,
     OUTSIDE_FOOTNOTE,
+    PREFIX_FOOTNOTE,
     marked,
     training_note,
 )
@@ -189,6 +190,8 @@ def print_summary(summary: pd.DataFrame) -> None:
         out.print(FOOTNOTE)
     if summary["computed_outside"].any():
         out.print(OUTSIDE_FOOTNOTE)
+    if summary["over_prefixes"].any():
+        out.print(PREFIX_FOOTNOTE)
     for label, group in summary[summary["training"] != ""].groupby("label", sort=False):
         note = training_note(str(label), *group[["training", "training_time"]].iloc[0])
         out.print(note, markup=False, highlight=False, soft_wrap=True)

@@ -143,6 +143,9 @@ def _presence(base: Leaderboard, current: Leaderboard) -> list[Change]:
     for cell in after.keys() - before.keys():
         changes.append(_fact("new", cell, "was not run in the base"))
     for cell in before.keys() & after.keys():
+        if before[cell].salt != after[cell].salt:
+            changes.append(_fact("missing", cell, "drawn with another secret than the base's"))
+            continue
         broken = sorted(set(before[cell].seeds) & after[cell].failed.keys())
         if broken:
             detail = f"{len(broken)} runs that were ok, first seed {broken[0]}: "
@@ -163,7 +166,7 @@ def _rms_changes(
     cells, ratios, p_worse, p_improved, numbers = [], [], [], [], []
     for cell in sorted(before.keys() & after.keys()):
         seeds = sorted(set(before[cell].seeds) & set(after[cell].seeds))
-        if not seeds:
+        if not seeds or before[cell].salt != after[cell].salt:
             continue
         sums = np.stack([_columns(runs, seeds) for runs in (before[cell], after[cell])], axis=-1)
         scores = mean_log_rms(sums[None, 0], sums[None, 1])

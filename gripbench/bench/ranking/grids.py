@@ -198,6 +198,7 @@ def on_board(
             part = part[~part["label"].isin(elsewhere)]
             part, strays = _without_strays(part)
             part, notes = _where_all_run(part, set(homes.index))
+            _check_salts(part, target)
             parts.append((part, [*strays, *notes]))
     return parts
 
@@ -208,11 +209,29 @@ def _check_worlds(ran: pd.DataFrame, target: str) -> None:
         worlds = {str(world): sorted(set(rows["label"])) for world, rows in part.groupby("world")}
         if len(worlds) > 1:
             groups = sorted(worlds.values(), key=len)
+            _check_salts(part, target)
             raise InputError(
                 f"{target}: rows of '{scenario}' come from {len(worlds)} versions of the scenario "
                 f"or of the scoring ({groups[0][0]} has another one than {groups[-1][0]}); run it "
                 "again for all of them: 'gripbench run' replaces what is out of date"
             )
+
+
+def salts_of(rows: pd.DataFrame) -> list[str]:
+    """Return the digests of the secrets that rows were drawn with; a frame of old rows has none."""
+    return sorted(set(rows["salt"])) if "salt" in rows else []
+
+
+def _check_salts(part: pd.DataFrame, target: str) -> None:
+    """Raise InputError where drives of a board were not all drawn with one secret, or none."""
+    salts = salts_of(part[part["status"] != "skipped"])
+    if len(salts) > 1:
+        one, other = (part[part["salt"] == salt].iloc[0] for salt in (salts[0], salts[-1]))
+        raise InputError(
+            f"{target}: '{one['label']}' on '{one['scenario']}' and '{other['label']}' on "
+            f"'{other['scenario']}' were not drawn with the same secret (GRIPBENCH_SALT); rank "
+            "them apart, or run one of them again"
+        )
 
 
 def _without_strays(part: pd.DataFrame) -> tuple[pd.DataFrame, list[str]]:

@@ -12,7 +12,7 @@ FOOTNOTE = f"{MARK} reads an idealised channel, which no sensor in a vehicle giv
 OUTSIDE = "‡"
 """Follows the name of a method whose estimates were handed in."""
 
-MARKED_BY = ("idealised", "computed_outside", "training")
+MARKED_BY = ("idealised", "computed_outside", "training", "over_prefixes")
 """Columns that decide on a method's marks, in the order in which `marked` takes them."""
 
 TRAINED = "§"
@@ -21,8 +21,18 @@ TRAINED = "§"
 OUTSIDE_FOOTNOTE = f"{OUTSIDE} computed outside: neither causality nor runtime checked"
 
 
+OVER_PREFIXES = "¶"
+"""Follows the name of a method that takes whole recordings."""
+
+PREFIX_FOOTNOTE = f"{OVER_PREFIXES} takes whole recordings: causality checked at random cuts"
+
+
 def marked(
-    label: str, idealised: str | tuple[str, ...], outside: bool = False, training: str = ""
+    label: str,
+    idealised: str | tuple[str, ...],
+    outside: bool = False,
+    training: str = "",
+    over_prefixes: bool = False,
 ) -> str:
     """Return a method's label with its marks.
 
@@ -36,8 +46,15 @@ def marked(
         Whether its estimates were handed in.
     training
         How it was trained.
+    over_prefixes
+        Whether it takes whole recordings.
     """
-    marks = ((MARK, idealised), (OUTSIDE, outside), (TRAINED, training))
+    marks = (
+        (MARK, idealised),
+        (OUTSIDE, outside),
+        (TRAINED, training),
+        (OVER_PREFIXES, over_prefixes),
+    )
     return label + "".join(mark for mark, there in marks if there)
 
 

@@ -11,7 +11,7 @@ import pandas as pd
 from gripbench.bench.ranking import statistics
 from gripbench.bench.ranking.grids import instruments
 from gripbench.bench.ranking.measures import SILENT as SILENT_STATUS
-from gripbench.bench.ranking.summary import outside_of, training_of
+from gripbench.bench.ranking.summary import outside_of, over_prefixes_of, training_of
 from gripbench.bench.scoring.consistency import SILENT, RunsTest, runs_test
 from gripbench.bench.scoring.metric import Metric, pooled_rms
 from gripbench.bench.scoring.metrics import metrics
@@ -47,6 +47,7 @@ def method_line(group: pd.DataFrame, complete: bool, settings: Settings) -> dict
     line |= {
         "computed_outside": bool(outside_of(group).any()),
         **dict(zip(("training", "training_time"), training_of(group), strict=True)),
+        "over_prefixes": over_prefixes_of(group),
         "reads": ", ".join(instruments(first["sensors"])),
         "rms": pooled_rms(good["sum_of_squares"], good["count"]) if complete else np.nan,
         "rms_from": low,

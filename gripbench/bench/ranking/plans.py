@@ -6,6 +6,7 @@ do not touch its boards.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import cache
 from typing import Any
 
@@ -54,6 +55,32 @@ def setting_of(scenario: str) -> str:
     if level:
         return "production spread" if level == 1 else f"wide spread, level {level}"
     return "the papers' setting" if plan_of(scenario) else ""
+
+
+def hiding_of(scenarios: Iterable[str], salt: str) -> str:
+    """Return what a board has to say of its drives: whether anybody could simulate them before.
+
+    Parameters
+    ----------
+    scenarios
+        Names of the board's scenarios.
+    salt
+        Digest of the secret that they were drawn with; empty: none.
+    """
+    names = list(scenarios)
+    if not names or names[0].startswith(PREFIX):
+        return ""
+    if not any(map(level_of, names)):
+        return (
+            "Level 0, for reproduction only: the car on paper is driven, and anybody can simulate "
+            "these drives."
+        )
+    if salt:
+        return (
+            f"Hidden seeds: drawn with a secret (digest {salt[:8]}), which nobody who lacks it can "
+            "simulate."
+        )
+    return "Public seeds: anybody can simulate these drives beforehand."
 
 
 def standing(scenario: str) -> int:

@@ -27,13 +27,14 @@ from gripbench.bench.ranking.grids import (
     chosen_instruments,
     grid_of,
     on_board,
+    salts_of,
     sensor_sets,
 )
 from gripbench.bench.ranking.log_windows import scored_windows
 from gripbench.bench.ranking.measures import RMS, measure_of
 from gripbench.bench.ranking.method_lines import Settings, method_line
 from gripbench.bench.ranking.pareto import pareto_front
-from gripbench.bench.ranking.plans import plan_of
+from gripbench.bench.ranking.plans import hiding_of, plan_of
 from gripbench.bench.ranking.skill import against_guess, best_baseline
 from gripbench.bench.running.recorded_scenarios import PREFIX
 from gripbench.bench.scoring.metrics import metrics
@@ -42,6 +43,7 @@ from gripbench.errors import InputError, unknown
 _BEFORE = (
     "target", "sensors", "by", "rank", "rank_from", "rank_to", "group", "label", "method",
     "variant", "title", "reads", "idealised", "baseline", "computed_outside", "training",
+    "over_prefixes",
     "score", "score_from", "score_to", "elsewhere_from", "elsewhere_to", "skill", "verdict",
     "beats_guess", "beats_next", "worse_than_guess", "uncertainty", "nees_low", "nees_high",
     "rms", "rms_from", "rms_to",
@@ -49,7 +51,7 @@ _BEFORE = (
 _SCORES = ("score", "score_from", "score_to", "elsewhere_from", "elsewhere_to")
 _BEHIND = (
     "training_time", "step_batch", "step_p50", "step_p99", "step_max", "deadline_misses", "pareto",
-    "failures", "reason", "cells", "seeds", "scenarios",
+    "failures", "reason", "cells", "seeds", "scenarios", "salt",
 )  # fmt: skip
 
 
@@ -100,6 +102,8 @@ class Board:
         What was left out, one sentence each.
     by
         What it ranks by: `rms`, or `crps` for a board of uncertainty.
+    salt
+        Digest of the secret that its drives were drawn with; empty: none, seeds are public.
     """
 
     target: str
@@ -115,6 +119,12 @@ class Board:
     wins: pd.DataFrame
     notes: tuple[str, ...]
     by: str = "rms"
+    salt: str = ""
+
+    @property
+    def hiding(self) -> str:
+        """Whether its seeds were hidden, one sentence."""
+        return hiding_of(self.scenarios, self.salt)
 
 
 def rank(
@@ -249,6 +259,7 @@ def _board(
     lines["cells"] = grid.cells
     lines["seeds"] = len(grid.seeds) or 1
     lines["scenarios"] = len(grid.scenarios) + len(grid.single)
+    lines["salt"] = salt = next(iter(salts_of(grid.rows)), "")
     lines["pareto"] = pareto_front(lines["score"], lines["step_batch"])
     lines = lines.sort_values(["rank", "label"], ignore_index=True)
     order = list(lines["label"])
@@ -274,6 +285,7 @@ def _board(
         wins=pd.DataFrame(wins, index=order, columns=order),
         notes=(*(f"Scored: {text}." for text in scored_windows(grid.rows).values()), *grid.notes),
         by=grid.measure.name,
+        salt=salt,
     )
 
 

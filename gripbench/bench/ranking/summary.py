@@ -25,7 +25,7 @@ def summary(rows: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     Frame with the columns `scenario, target, label, idealised, computed_outside, training,
-    training_time, runs, ok, status, rms, low, high`:
+    training_time, over_prefixes, runs, ok, status, rms, low, high`:
     `rms` is pooled over the runs that are `ok` by the mean of squares, `low` and `high` bound its
     95 % interval (over runs, see `statistics.pooled_rms_interval`), `status` counts the others.
     For the available friction also, over the runs that are excited, `excited, excited_rms,
@@ -50,6 +50,7 @@ def summary(rows: pd.DataFrame) -> pd.DataFrame:
                 "idealised": str(group["idealised"].iloc[0]),
                 "computed_outside": bool(outside_of(group).any()),
                 **dict(zip(("training", "training_time"), training_of(group), strict=True)),
+                "over_prefixes": over_prefixes_of(group),
                 "runs": len(group),
                 "ok": len(good),
                 "status": ", ".join(f"{count} {status}" for status, count in others.items()),
@@ -61,7 +62,7 @@ def summary(rows: pd.DataFrame) -> pd.DataFrame:
         )
     columns = (
         "scenario", "target", "label", "idealised", "computed_outside", "training",
-        "training_time", "runs", "ok", "status",
+        "training_time", "over_prefixes", "runs", "ok", "status",
         "rms", "low", "high",
         "excited", "excited_rms", "excited_low", "excited_high",
         "settled", "delay", "delay_low", "delay_high",
@@ -108,6 +109,11 @@ def _mean_of_settled(delays: np.ndarray) -> tuple[int, float, float, float]:
     return len(finite), mean, float(low), float(high)
 
 
+def over_prefixes_of(rows: pd.DataFrame) -> bool:
+    """Return whether the method of these rows takes whole recordings; old rows know of none."""
+    return "over_prefixes" in rows and bool(rows["over_prefixes"].astype(bool).any())
+
+
 def training_of(rows: pd.DataFrame) -> tuple[str, float]:
     """Return how the method of these rows was trained, and how long it took [s]; old rows: `""`."""
     if "training" not in rows:
@@ -150,5 +156,6 @@ MEASURED = (
 
 def scores_csv(rows: pd.DataFrame) -> str:
     """Return rows as CSV without what was measured: the same bytes for the same cells."""
-    text: str = rows.drop(columns=list(MEASURED)).to_csv(index=False, lineterminator="\n")
+    usual = [name for name in ("salt", "over_prefixes") if not rows[name].astype(bool).any()]
+    text: str = rows.drop(columns=[*MEASURED, *usual]).to_csv(index=False, lineterminator="\n")
     return text

@@ -41,6 +41,7 @@ def run(
     fresh: bool = False,
     time_limit: float = 60.0,
     memory_limit: float = 2048.0,
+    show_output: bool = False,
 ) -> pd.DataFrame:
     """Run methods on scenarios and return their scores.
 
@@ -68,6 +69,8 @@ def run(
         Run again what is stored.
     time_limit, memory_limit
         What one cell of a method that is not built in may take: wall-clock time [s], memory [MiB].
+    show_output
+        Whether what such a method prints appears on standard error, each line behind its name.
 
     Returns
     -------
@@ -84,20 +87,20 @@ def run(
         plan,
         Store(results),
         Backend(backend, workers, scheduler),
-        limits_of(time_limit, memory_limit),
+        limits_of(time_limit, memory_limit, show_output),
         fresh,
         rows.append,
     )
     return frame_of(sorted(rows, key=order_in(plan)))
 
 
-def limits_of(time_limit: float, memory_limit: float) -> Limits:
-    """Return checked limits of time [s] and memory [MiB]."""
+def limits_of(time_limit: float, memory_limit: float, show_output: bool = False) -> Limits:
+    """Return checked limits of time [s] and memory [MiB], with whether output is shown."""
     if not 0.0 < time_limit < float("inf"):
         raise InputError(f"time limit is {time_limit:g} s; it must be positive")
     if not 1.0 <= memory_limit < float("inf"):
         raise InputError(f"memory limit is {memory_limit:g} MiB; it must be at least 1")
-    return Limits(time_limit, int(memory_limit * 1024**2))
+    return Limits(time_limit, int(memory_limit * 1024**2), show_output)
 
 
 def order_in(plan: Plan) -> Callable[[Row], tuple[int, int, int]]:

@@ -20,7 +20,7 @@ from gripbench.bench.catalogue.registry import MethodSpec, method_digest
 from gripbench.bench.running.deadline import DeadlineError, deadline
 from gripbench.bench.running.dependencies import folder_of, kept, unchanged
 from gripbench.bench.running.execution import Outcome, SkippedError, execute, missing
-from gripbench.bench.running.fingerprints import versions, world_digest
+from gripbench.bench.running.fingerprints import salt_of, versions, world_digest
 from gripbench.bench.running.isolation.limits import CellFailure, Limits
 from gripbench.bench.running.isolation.processes import stop_starters
 from gripbench.bench.running.isolation.sandbox import Sandbox
@@ -192,8 +192,8 @@ def _check_code(cell: Cell) -> None:
     if found.key != cell.key:
         raise OtherCodeError(
             f"a worker ({platform.node()}, process {os.getpid()}) has another gripbench or other "
-            "packages than the process that asks it: a file was edited meanwhile, or the cluster "
-            "has to be started again; then run the same command again"
+            "packages, or another GRIPBENCH_SALT, than the process that asks it: a file was edited "
+            "meanwhile, or the cluster has to be started again; then run the same command again"
         )
     _checked.add(shared)
 
@@ -257,7 +257,8 @@ def run_cell(
     trained = cell.method.trained
     training = {"training": trained.seconds if trained else None}
     runtime = outcome.runtime.model_copy(update=training)
-    row = row.model_copy(update={"scores": scores, "runtime": runtime})
+    found = {"scores": scores, "runtime": runtime, "over_prefixes": outcome.over_prefixes}
+    row = row.model_copy(update=found)
     return _resting_on(cell, row, outcome.read)
 
 
@@ -310,6 +311,7 @@ def _row(cell: Cell, targets: tuple[str, ...], status: Status, reason: str) -> R
     return Row(
         key=cell.key,
         world=cell.world,
+        salt=salt_of(cell.scenario),
         scenario=cell.scenario.name,
         seed=cell.seed,
         method=declaration.name,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from numbers import Real
@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from gripbench.bench.catalogue.declarations import Declaration
 from gripbench.bench.running.rows import Runtime
-from gripbench.bench.scoring.scoring import EstimateError
+from gripbench.bench.scoring.scoring import MISSING, EstimateError
 from gripbench.envs.signals import record_type
 from gripbench.errors import GripbenchError, UndeclaredChannelError, nearest
 from gripbench.methods.samples import is_given, select_channels
@@ -57,11 +57,14 @@ class Outcome:
         Times of its steps [s].
     read
         What an isolated method was seen to read, see `running.isolation.audit.report`.
+    over_prefixes
+        Whether it was given whole recordings and its causality is that of `isolation.prefixes`.
     """
 
     estimates: npt.NDArray[Any]
     runtime: Runtime
     read: Mapping[str, Any] = field(default_factory=dict)
+    over_prefixes: bool = False
 
 
 def missing(
@@ -116,19 +119,54 @@ def execute(
     """
     selected = select_channels(observations, declaration.sensors)
     paper = VehicleOnPaper(vehicle)
+    online = takes_samples(method)
     if callable(getattr(method, "run", None)):
-        method.run(paper, selected[:2])  # compiles; its time is no step's time
+        if online:
+            method.run(paper, selected[:2])  # compiles; its time is no step's time
         began = time.perf_counter()
         estimates = method.run(paper, selected)
         batch = (time.perf_counter() - began) / max(len(selected), 1)
+        estimates = estimates_of(estimates, declaration.outputs, len(selected))
         calls = np.empty(0)
-        if timed:
+        if timed and online:
             _, calls = _online(method, declaration, paper, selected[: ONLINE_SAMPLES + 10])
             calls = calls[10:]
     else:
         estimates, calls = _online(method, declaration, paper, selected)
         batch = float(calls.mean())
     return Outcome(estimates, runtime_of(calls, period, batch))
+
+
+def takes_samples(method: Any) -> bool:
+    """Return whether a method takes samples one by one; otherwise it takes whole recordings."""
+    return callable(getattr(method, "update", None))
+
+
+def estimates_of(given: Any, outputs: tuple[str, ...], length: int) -> Any:
+    """Return what `run` returned as a structured array; a mapping of arrays by name is made one.
+
+    Raises
+    ------
+    EstimateError
+        If an array in a mapping is not one of `length` real numbers, or one is missing.
+    UndeclaredChannelError
+        If there is one that was not declared.
+    """
+    if isinstance(given, np.ndarray) or not isinstance(given, Mapping):
+        return given
+    if set(given) != set(outputs):
+        raise _wrong(given, outputs)
+    estimates = np.empty(length, record_type(outputs))
+    for name in outputs:
+        values = np.asarray(given[name])
+        if isinstance(given[name], np.ma.MaskedArray) or values.dtype.kind not in "iuf":
+            raise EstimateError(f"the estimate '{name}' is {_kind(given[name])} of no real numbers")
+        if values.shape != (length,):
+            raise EstimateError(
+                f"the estimate '{name}' has shape {values.shape}; it should be ({length},)"
+            )
+        estimates[name] = values
+    return estimates
 
 
 def run_online(
@@ -158,21 +196,33 @@ def _online(
     clock = time.perf_counter_ns
     method.reset(VehicleOnPaper(vehicle), step)
     update = method.update
+    last = [MISSING] * len(outputs)
     for k, sample in enumerate(observations.tolist()):
         obs = Observation(zip(names, sample, strict=True))
         obs.method = declaration.name
         began = clock()
         given = update(obs)
         took[k] = clock() - began
-        values[k] = numbers_of(given, outputs)
+        values[k] = last = numbers_of(given, outputs, last)
     return estimates, took.astype(np.float64) * 1e-9
 
 
-def numbers_of(given: Any, outputs: tuple[str, ...]) -> list[float]:
+def numbers_of(given: Any, outputs: tuple[str, ...], last: Sequence[float]) -> list[float]:
     """Return what `update` returned as floats, in the order of the declared outputs.
+
+    Where it returned None, as a whole or for an estimate, the last value holds.
 
     Only a real number counts as one: no text that looks like one, no bool, no array, no masked,
     complex or date value. NaN and infinity are numbers here; scoring finds them.
+
+    Parameters
+    ----------
+    given
+        The mapping that `update` returned, or None.
+    outputs
+        The declared estimates and variances.
+    last
+        What this returned for the sample before; at first `scoring.MISSING`.
 
     Raises
     ------
@@ -181,6 +231,8 @@ def numbers_of(given: Any, outputs: tuple[str, ...]) -> list[float]:
     UndeclaredChannelError
         If there is one that was not declared.
     """
+    if given is None:
+        return list(last)
     try:
         values = [given[name] for name in outputs]
     except (KeyError, TypeError, IndexError):
@@ -188,8 +240,8 @@ def numbers_of(given: Any, outputs: tuple[str, ...]) -> list[float]:
     if len(given) != len(outputs):
         raise _wrong(given, outputs)
     return [
-        value if type(value) is float else _number(name, value)
-        for name, value in zip(outputs, values, strict=True)
+        value if type(value) is float else before if value is None else _number(name, value)
+        for name, value, before in zip(outputs, values, last, strict=True)
     ]
 
 

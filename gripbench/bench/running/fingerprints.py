@@ -22,6 +22,7 @@ import gripbench
 from gripbench.bench.running import recorded_scenarios, recorded_windows
 from gripbench.bench.scoring.metrics import metrics
 from gripbench.envs import worlds
+from gripbench.envs.hidden_draws import salt_digest
 from gripbench.envs.instruments.fault_injection import Faults
 from gripbench.envs.instruments.faults import choose_fault
 from gripbench.envs.populations.draws import drawn_from
@@ -89,4 +90,10 @@ def scoring_digest() -> str:
 
 def world_digest(scenario: Scenario) -> str:
     """Return the digest of a scenario and of the scoring: what rows of one board have in common."""
-    return digest(scenario_digest(scenario), scoring_digest())
+    secret = salt_of(scenario)
+    return digest(scenario_digest(scenario), scoring_digest(), *([secret] if secret else []))
+
+
+def salt_of(scenario: Scenario) -> str:
+    """Return the digest of the secret that a scenario's draws come from; empty: none, public."""
+    return "" if isinstance(scenario, recorded_scenarios.RecordedScenario) else salt_digest()

@@ -11,7 +11,13 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+)
 
 from gripbench.bench.catalogue.training import Training
 from gripbench.bench.scoring.metric import Value
@@ -122,6 +128,10 @@ class Row(Configuration):
         Of a recording, what part of the log was scored.
     training
         How the method was trained; None: it was not.
+    salt
+        Digest of the secret from which the drive was drawn; empty: none, anybody can simulate it.
+    over_prefixes
+        Whether it was given the whole recording, and its causality checked at random cuts.
     method_digest
         Digest of source and settings of a plug-in; empty for a method that ships with gripbench.
     checked
@@ -159,9 +169,19 @@ class Row(Configuration):
     computed_outside: bool = False
     window: LogWindow | None = None
     training: Training | None = None
+    salt: str = ""
+    over_prefixes: bool = False
     method_digest: str = ""
     checked: Checked = Field(default="", exclude=True)
     versions: dict[str, str] = Field(default_factory=dict)
+
+    @model_serializer(mode="wrap")
+    def _without_what_is_usual(self, usual: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        content: dict[str, Any] = usual(self)
+        for name in ("salt", "over_prefixes"):
+            if not content[name]:
+                del content[name]  # such a row is what it was before there were others
+        return content
 
 
 def _score_of_any_run(scores: dict[str, dict[str, Value]]) -> dict[str, dict[str, Value]]:
@@ -270,9 +290,10 @@ def frame_of(rows: Iterable[Row]) -> pd.DataFrame:
     vanishes from a table made of the frame. Columns: `scenario, seed, label, method, variant,
     title, target, status, reason`, the columns of each metric, `sample_period, step_batch,
     step_p50, step_p99, step_max, deadline_misses, sensors, idealised, parameters, baseline,
-    world, key, checked, computed_outside, log_run, log_from, log_to, training, training_time`: the
+    world, key, checked, computed_outside, log_run, log_from, log_to, training, training_time, salt,
+    over_prefixes`: the
     three of a log say which run and what interval [s] on its own clock was scored, NaN for a
-    simulated run; the last two how the method was trained, in words, and how long that took [s].
+    simulated run; the two behind how the method was trained, in words, and how long that took [s].
 
     A metric has a column of its name; one that is pooled by totals also `<name>_total` and
     `<name>_count`, which for the RMS are called `sum_of_squares` and `count`. NaN: the metric has
@@ -305,7 +326,7 @@ _COMMON = (
     "scenario", "seed", "label", "method", "variant", "title", "status", "reason",
     "sample_period", "step_batch", "step_p50", "step_p99", "step_max", "deadline_misses",
     "sensors", "idealised", "parameters", "baseline", "world", "key", "checked",
-    "computed_outside", *LOG_WINDOW, "training", "training_time",
+    "computed_outside", *LOG_WINDOW, "training", "training_time", "salt", "over_prefixes",
 )  # fmt: skip
 
 
@@ -339,6 +360,8 @@ def _common_columns(row: Row) -> dict[str, Any]:
         "log_to": window.end if window else math.nan,
         "training": row.training.text if row.training else "",
         "training_time": runtime.training if runtime else None,
+        "salt": row.salt,
+        "over_prefixes": row.over_prefixes,
     }
 
 

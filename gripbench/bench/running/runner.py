@@ -21,7 +21,7 @@ from gripbench.bench.catalogue.training import check_test_seeds
 from gripbench.bench.running.backends import Backend, WorkerLostError
 from gripbench.bench.running.cells import Cell, Task, cell_of, close_sandboxes, run_tasks
 from gripbench.bench.running.dependencies import folder_of, unchanged
-from gripbench.bench.running.fingerprints import world_digest
+from gripbench.bench.running.fingerprints import salt_of, world_digest
 from gripbench.bench.running.fitting import fitted
 from gripbench.bench.running.isolation.limits import Limits
 from gripbench.bench.running.isolation.processes import stop_starters
@@ -133,7 +133,8 @@ def run_plan(
     InputError
         If two methods have the same label, or rows cannot be written.
     """
-    backend, limits = backend or Backend(), limits or Limits()
+    backend = backend or Backend()
+    limits = replace(limits or Limits(), closed=str(store.results.resolve()))
     _check_labels(plan)
     _check_process()
     _check_training(plan)
@@ -198,6 +199,12 @@ def _reusable(store: Store, cell: Cell, limits: Limits) -> Row | None:
         row = store.read(cell.scenario.name, cell.method.label, cell.seed)
     except DamagedRowError:
         return None
+    if row is not None and row.salt != salt_of(cell.scenario):
+        secret = "another secret" if row.salt else "no secret"
+        raise InputError(
+            f"{store.results}: holds rows of '{row.label}' on '{row.scenario}' that were drawn "
+            f"with {secret}; choose another --results, or set GRIPBENCH_SALT as it was"
+        )
     if row is None or row.key != cell.key or row.passing or row.untracked:
         return None
     if row.status == "timeout" and (row.time_limit or 0.0) < limits.time:

@@ -22,7 +22,7 @@ from gripbench.bench.catalogue.registry import method_names
 from gripbench.bench.catalogue.scenarios import find_scenario
 from gripbench.bench.running.execution import missing
 from gripbench.bench.running.exporting import FORMATS, Drive, digest_of_samples, read_records
-from gripbench.bench.running.fingerprints import versions, world_digest
+from gripbench.bench.running.fingerprints import salt_of, versions, world_digest
 from gripbench.bench.running.recorded_scenarios import (
     RecordedScenario,
     judged,
@@ -128,8 +128,8 @@ def submit(
         same = digest_of_samples(recording.observations) == drive.observations
         if worlds[drive.scenario] != drive.world or not same:
             raise InputError(
-                f"{folder / key}: the scenario, gripbench or its packages have changed since this "
-                "drive was exported; export again"
+                f"{folder / key}: the scenario, gripbench, its packages or GRIPBENCH_SALT have "
+                "changed since this drive was exported; export again"
             )
         present = recording.observations.dtype.names or ()
         if not all(is_given(channel, present) for channel in channels):
@@ -369,6 +369,7 @@ def _row(
     return Row(
         key=digest(drive.world, "outside", declaration.name, reads, outputs, result.content),
         world=drive.world,
+        salt=salt_of(scenario),
         scenario=scenario.name,
         seed=drive.seed,
         method=declaration.name,

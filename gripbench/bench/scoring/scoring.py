@@ -2,8 +2,9 @@
 
 Samples before the recording's `score_from`, and those whose truth is not finite (a log without a
 reference there), do not count. An estimate that is not finite, scored or not, makes the run
-`diverged`. Angles are compared on the circle: an estimate is moved by whole turns to the branch of
-the truth, so that no metric sees an error beyond half a turn.
+`diverged`. What a method has not said yet (`MISSING`, before its first estimate) does not count
+either, for a second at most. Angles are compared on the circle: an estimate is moved by whole turns
+to the branch of the truth, so that no metric sees an error beyond half a turn.
 """
 
 from __future__ import annotations
@@ -28,6 +29,14 @@ Scores = dict[str, Value]
 """Values of one target in one run, by the name of the metric."""
 
 _LARGEST = math.sqrt(np.finfo(float).max)
+
+_BITS = np.uint64(0x7FF8_0000_0067_7269)
+
+MISSING = float(_BITS.view(np.float64))
+"""Stands before a method's first estimate: a NaN with bits of its own."""
+
+LATEST = 1.0
+"""Time [s] into what counts by which the first estimate has to be there."""
 
 
 class DivergedError(GripbenchError):
@@ -80,8 +89,9 @@ def score(
     check_estimates(estimates, outputs, len(recording.truth))
     truth = recording.truth
     times = np.ascontiguousarray(truth["time"])
+    given = {name: _given(name, estimates[name], times, recording.score_from) for name in outputs}
     for name in outputs:
-        first = _first_not_finite(estimates[name])
+        first = _first_not_finite(np.where(given[name], estimates[name], 0.0))
         if first >= 0:
             raise DivergedError(f"{name} is {estimates[name][first]} from t = {times[first]:.6g} s")
     _check_variances(estimates, outputs, times)
@@ -91,7 +101,8 @@ def score(
     innovations = _innovations(estimates, outputs, inside)
     scores = {}
     for name in targets:
-        counted = inside & np.isfinite(truth[name])
+        counted = inside & np.isfinite(truth[name]) & given[name]
+        counted &= given.get(name + VARIANCE, True)
         if not counted.any():
             continue
         estimate, true, context = context_of(name, estimates, outputs, recording, counted)
@@ -281,6 +292,27 @@ def check_estimates(estimates: Any, outputs: tuple[str, ...], length: int) -> No
     for name in outputs:
         if estimates.dtype[name] != np.float64:
             raise EstimateError(f"the estimate '{name}' is not of type float64")
+
+
+def missing_at_first(values: npt.NDArray[np.float64]) -> int:
+    """Return the number of samples before the first estimate."""
+    said = np.ascontiguousarray(values).view(np.uint64) != _BITS
+    return int(np.argmax(said)) if said.any() else len(values)
+
+
+def _given(
+    name: str, values: npt.NDArray[np.float64], times: npt.NDArray[np.float64], start: float
+) -> npt.NDArray[np.bool_]:
+    """Return for each sample whether a method had said anything by then."""
+    first = missing_at_first(values)
+    if first == len(values):
+        raise EstimateError(f"update never returned the estimate '{name}': return a number")
+    if first and not times[first] <= max(start, times[0]) + LATEST:
+        raise EstimateError(
+            f"the first estimate of '{name}' comes at t = {times[first]:.6g} s; give one, a guess, "
+            f"by t = {max(start, times[0]) + LATEST:g} s"
+        )
+    return np.arange(len(values)) >= first
 
 
 def _first_not_finite(values: npt.NDArray[np.float64]) -> int:

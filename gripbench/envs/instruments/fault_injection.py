@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gripbench.compilation import compiled
+from gripbench.envs.hidden_draws import entropy
 from gripbench.envs.instruments.faults import Chosen, Severity, check_present
 from gripbench.envs.signals import NEW, signal
 from gripbench.errors import InputError
@@ -228,8 +229,8 @@ class Faults:
 
 
 def _draws(seed: int, name: str) -> np.random.Generator:
-    entropy = [seed, zlib.crc32(f"fault {name}".encode())]
-    return np.random.default_rng(np.random.SeedSequence(entropy))
+    words = entropy(seed, zlib.crc32(f"fault {name}".encode()))
+    return np.random.default_rng(np.random.SeedSequence(words))
 
 
 def _events(

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from gripbench.envs.hidden_draws import entropy
 from gripbench.envs.instruments.measuring import (
     SENSOR_STATE,
     SENSOR_TYPE,
@@ -71,7 +72,7 @@ class SensorSuite:
                     f"samples, {1.0 / sample_time:g} Hz"
                 )
             first, drawn, walked = np.random.SeedSequence(
-                [seed, zlib.crc32(channel.encode())]
+                entropy(seed, zlib.crc32(channel.encode()))
             ).spawn(3)
             constant = np.random.default_rng(first).standard_normal(3)
             self._streams.append((np.random.default_rng(drawn), np.random.default_rng(walked)))

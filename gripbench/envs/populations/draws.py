@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from gripbench.envs.hidden_draws import entropy
 from gripbench.envs.instruments.sensors import Sensor
 from gripbench.envs.populations.cars import car_on_road
 from gripbench.envs.populations.causes import CAUSES, DIMENSION, SHAPES_OF_TYRES
@@ -65,15 +66,15 @@ class Draw:
 
 def quantiles(seed: int) -> npt.NDArray[np.float64]:
     """Return point `seed` of the sequence, shape (DIMENSIONS,), each within 0 and 1."""
-    return np.asarray(_hypercube(seed // BLOCK)[seed % BLOCK])
+    return np.asarray(_hypercube(*entropy(_ENTROPY, seed // BLOCK))[seed % BLOCK])
 
 
 @lru_cache(maxsize=64)
-def _hypercube(block: int) -> npt.NDArray[np.float64]:
-    """Return a block of the sequence, shape (BLOCK, DIMENSIONS)."""
+def _hypercube(*words: int) -> npt.NDArray[np.float64]:
+    """Return a block of the sequence, shape (BLOCK, DIMENSIONS), from what names it."""
     from scipy.stats import qmc  # slow to import
 
-    draws = np.random.default_rng([_ENTROPY, block])
+    draws = np.random.default_rng(list(words))
     sampler = qmc.LatinHypercube(DIMENSIONS, rng=draws)
     candidates = [sampler.random(BLOCK) for _ in range(_CANDIDATES)]
     return np.asarray(min(candidates, key=_largest_correlation))

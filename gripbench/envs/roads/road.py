@@ -18,6 +18,7 @@ from pydantic import Field, model_validator
 
 from gripbench.compilation import compiled
 from gripbench.configuration import Configuration
+from gripbench.envs.hidden_draws import entropy
 from gripbench.envs.plants.planar import plant
 from gripbench.envs.vehicles import GRAVITY
 
@@ -137,7 +138,7 @@ class Ground:
 
 def stream(seed: int, name: str) -> np.random.Generator:
     """Return the random stream of a run that belongs to a name."""
-    return np.random.default_rng(np.random.SeedSequence([seed, zlib.crc32(name.encode())]))
+    return np.random.default_rng(np.random.SeedSequence(entropy(seed, zlib.crc32(name.encode()))))
 
 
 def lay_road(road: Road, curvature: npt.NDArray[np.float64], length: float, seed: int) -> Ground:

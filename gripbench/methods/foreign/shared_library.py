@@ -5,9 +5,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import cache
 from typing import Any, ClassVar
 
+import numpy as np
+import numpy.typing as npt
+
+from gripbench.envs.signals import record_type
 from gripbench.errors import GripbenchError, InputError
 from gripbench.methods.foreign.declared import ForeignMethod
 
@@ -17,6 +22,46 @@ int gripbench_update(void *state, const double *sample, double *estimates);
 void gripbench_end(void *state);
 """
 """The three functions that a library has."""
+
+
+@cache
+def library_loop() -> Callable[[int, int, npt.NDArray[np.float64], npt.NDArray[np.float64]], int]:
+    """Return the compiled loop that calls a library's update for every sample of a recording.
+
+    It takes the address of the function, the state, samples of shape (n, channels + 1) and
+    estimates of shape (n, outputs) to fill; it returns the first code that is not 0, or 0.
+    """
+    import numba
+    from llvmlite import ir
+    from numba.core import types
+    from numba.extending import intrinsic
+
+    @intrinsic
+    def call(context, function, state, sample, estimates):  # type: ignore[no-untyped-def]
+        def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+            pointer = ir.IntType(8).as_pointer()
+            kind = ir.FunctionType(ir.IntType(32), [pointer] * 3)
+            target = builder.inttoptr(arguments[0], kind.as_pointer())
+            given = [builder.inttoptr(item, pointer) for item in arguments[1:]]
+            return builder.call(target, given)
+
+        return types.int32(types.intp, types.intp, types.intp, types.intp), generate
+
+    @numba.njit(nogil=True)
+    def loop(function, state, samples, estimates):  # type: ignore[no-untyped-def]
+        sample, estimate = samples.ctypes.data, estimates.ctypes.data
+        for k in range(samples.shape[0]):
+            if k > 0:
+                estimates[k] = estimates[k - 1]  # what is not written keeps its value
+            code = call(
+                function, state, sample + k * samples.strides[0],
+                estimate + k * estimates.strides[0],
+            )  # fmt: skip
+            if code != 0:
+                return code
+        return 0
+
+    return loop  # type: ignore[no-any-return]
 
 
 class SharedLibrary(ForeignMethod):
@@ -68,6 +113,33 @@ class SharedLibrary(ForeignMethod):
         if code:
             raise GripbenchError(f"{self.library}: gripbench_update returned {code}")
         return dict(zip(self.outputs, self._estimates, strict=True))
+
+    def run(self, vehicle: Mapping[str, float], observations: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """Run over a whole recording in one compiled loop.
+
+        Parameters
+        ----------
+        vehicle
+            Vehicle parameters by name.
+        observations
+            Structured array, shape (n,), with `time` and at least the declared channels.
+
+        Returns
+        -------
+        Structured array, shape (n,), one field for each output.
+        """
+        times = observations["time"]
+        self.reset(vehicle, float(times[1] - times[0]) if len(times) > 1 else 0.0)
+        samples = np.stack([observations[name] for name in (*self.sensors, "time")], axis=1)
+        estimates = np.zeros((len(samples), len(self.outputs)))
+        update, state = (
+            int(self._ffi.cast("uintptr_t", item))
+            for item in (self._functions.gripbench_update, self._state)
+        )
+        code = library_loop()(update, state, np.ascontiguousarray(samples), estimates)
+        if code:
+            raise GripbenchError(f"{self.library}: gripbench_update returned {code}")
+        return estimates.view(record_type(self.outputs)).reshape(len(samples))
 
     def _open(self) -> None:
         try:

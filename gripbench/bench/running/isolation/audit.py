@@ -57,6 +57,7 @@ class _Witness:
         self.seen: dict[tuple[str, str], str] = {}
         self.untracked: dict[str, None] = {}
         self.made: set[str] = set()
+        self.own = "\0"  # no path begins so
         self.busy = threading.local()
         self.home = str(Path(gripbench.__file__).resolve().parent) + os.sep
         self.units = str(place_of_units()) + os.sep  # copies of what a declared file holds
@@ -84,7 +85,7 @@ class _Witness:
 
     def foreign(self, path: str) -> bool:
         """Tell whether a file belongs to Python, an installed package or gripbench."""
-        return path.startswith((*_PLACES, self.home, self.units)) or _installed(path)
+        return path.startswith((*_PLACES, self.home, self.units, self.own)) or _installed(path)
 
     def asked(self) -> bool:
         """Tell whether the plug-in's own code asked, itself or through a library."""
@@ -197,6 +198,12 @@ def install() -> None:
         _watch_environment(_witness)
 
 
+def ignore(folder: str) -> None:
+    """Follow nothing that this process does in a folder of its own, which ends with it."""
+    if _witness is not None:
+        _witness.own = os.path.join(os.path.abspath(folder), "")
+
+
 def report() -> dict[str, Any]:
     """Return what was seen: `seen`, lists of kind, name and digest, and `untracked`, words."""
     if _witness is None:
@@ -236,7 +243,7 @@ def _watch_environment(witness: _Witness) -> None:
     usual = kind.__getitem__
 
     def getitem(self: Any, key: Any) -> Any:
-        if isinstance(key, str) and not getattr(witness.busy, "now", False):
+        if isinstance(key, str) and key != "TMPDIR" and not getattr(witness.busy, "now", False):
             frame = sys._getframe(1)
             while frame is not None and frame.f_code.co_filename.startswith(("<frozen", *_STDLIB)):
                 frame = frame.f_back  # type: ignore[assignment]

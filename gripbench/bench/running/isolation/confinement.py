@@ -1,8 +1,8 @@
 """What a plug-in's process is kept from, on systems that can: limits in, a confined process out.
 
 Linux: address space and core files are limited; the process ends with the one that started it; it
-may neither trace nor signal processes outside (Landlock), so that it cannot read what the run
-holds in memory. Elsewhere these do nothing.
+may neither trace nor signal processes outside, nor read the results, nor, once it is given samples,
+write any file but its own (`landlock`). Elsewhere these do nothing.
 """
 
 from __future__ import annotations
@@ -11,31 +11,30 @@ import contextlib
 import ctypes
 import os
 import signal as signals
-import struct
-import sys
 import time
 from collections.abc import Collection
 
 import psutil
 
-_SET_DEATH_SIGNAL, _SET_SUBREAPER, _SET_NO_NEW_PRIVILEGES = 1, 36, 38
-_CREATE_RULESET, _RESTRICT_SELF = 444, 446
-_MAKE_BLOCK_DEVICE = 1 << 11
-_SCOPE_SIGNALS = 2
+from gripbench.bench.running.isolation.landlock import enter_domain, refuse_kept_memory
+
+_SET_DEATH_SIGNAL, _SET_SUBREAPER = 1, 36
 
 
-def confine(memory: int) -> None:
+def confine(memory: int, closed: tuple[str, tuple[str, ...]] | None) -> None:
     """Limit what this process, and all that it starts, may take and reach.
 
     Parameters
     ----------
     memory
         Address space [bytes] beyond what it has now.
+    closed
+        A folder and names in it of what it cannot read.
     """
     _limit_memory(memory)
-    if sys.platform == "linux":
-        with contextlib.suppress(OSError, AttributeError):
-            _enter_landlock()
+    with contextlib.suppress(OSError, AttributeError):
+        enter_domain(closed)
+        refuse_kept_memory()
 
 
 def _limit_memory(memory: int) -> None:
@@ -50,30 +49,16 @@ def _limit_memory(memory: int) -> None:
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
-def part_from_parent() -> None:
-    """Keep this process from the memory of the confined one that forked it (Linux)."""
-    if sys.platform == "linux":
-        with contextlib.suppress(OSError, AttributeError):
-            _enter_landlock(signals_too=False)
+def part_from_parent(scratch: str) -> None:
+    """Keep the process of a cell from the one that forked it, and from every file but its own.
 
-
-def _enter_landlock(signals_too: bool = True) -> None:
-    """Enter a domain of its own: the kernel then refuses to trace or signal what is outside."""
-    library = ctypes.CDLL(None, use_errno=True)
-    version = library.syscall(_CREATE_RULESET, None, ctypes.c_size_t(0), 1)
-    if version < 1:
-        return
-    scopes = _SCOPE_SIGNALS if version >= 6 and signals_too else 0
-    # A ruleset has to handle something: making block devices, which no method does.
-    attributes = struct.pack("=QQQ", _MAKE_BLOCK_DEVICE, 0, scopes)
-    size = 24 if version >= 6 else 8
-    buffer = ctypes.create_string_buffer(attributes)
-    ruleset = library.syscall(_CREATE_RULESET, buffer, ctypes.c_size_t(size), 0)
-    if ruleset < 0:
-        return
-    library.prctl(_SET_NO_NEW_PRIVILEGES, 1, 0, 0, 0)
-    library.syscall(_RESTRICT_SELF, ruleset, 0)
-    os.close(ruleset)
+    Parameters
+    ----------
+    scratch
+        Folder below which alone it may write, make and remove files.
+    """
+    with contextlib.suppress(OSError, AttributeError):
+        enter_domain(writable=[scratch], scoped=False)
 
 
 def end_with(parent: int | None) -> None:

@@ -22,6 +22,10 @@ class Limits:
         Wall-clock time [s] of its samples; loading and compiling come before.
     memory
         Memory [bytes] beyond what the empty process has.
+    closed
+        Folder of the results, which it cannot read.
+    show
+        Whether what it prints is shown on standard error.
     sandbox
         Kind of sandbox, of `processes.SANDBOXES`; by default what the environment's variable
         GRIPBENCH_SANDBOX says.
@@ -29,6 +33,8 @@ class Limits:
 
     time: float = 60.0
     memory: int = 2 * 1024**3
+    show: bool = False
+    closed: str = ""
     sandbox: str = field(default_factory=lambda: os.environ.get(VARIABLE, ""))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import os
+import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,6 +16,7 @@ import numpy.typing as npt
 
 from gripbench.bench.catalogue.declarations import Declaration, Source
 from gripbench.bench.running.isolation.limits import Limits
+from gripbench.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -35,18 +37,36 @@ class Loaded:
     ----------
     declaration
         What it declares.
-    batch
-        Whether it has a form that takes a whole recording.
+    batch, online
+        Whether it has a form that takes a whole recording, and one that takes samples one by one.
     expected_failures
         Checks that it is known to fail, each with the reason.
     """
 
     declaration: Declaration
     batch: bool
+    online: bool
     expected_failures: dict[str, str]
 
 
-def loading_message(settings: Settings, limits: Limits, bounds: bool) -> dict[str, Any]:
+def scratch_folder() -> str:
+    """Return a new empty folder among the temporary files.
+
+    Raises
+    ------
+    InputError
+        If none can be made.
+    """
+    try:
+        return tempfile.mkdtemp(prefix="gripbench-")
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise InputError(f"no temporary folder can be made: {reason}; set TMPDIR") from None
+
+
+def loading_message(
+    settings: Settings, limits: Limits, bounds: bool, scratch: str
+) -> dict[str, Any]:
     """Return the message that has a plug-in loaded."""
     source = settings.source
     folder = ""
@@ -59,12 +79,24 @@ def loading_message(settings: Settings, limits: Limits, bounds: bool) -> dict[st
         "variant": settings.variant,
         "parameters": dict(settings.parameters),
         "memory": limits.memory,
+        "scratch": scratch,
+        "closed": _closed(limits.closed, folder),
         "folder": folder,
         "path": _places(source.kind, folder),
         "seed": _digest(b"loading"),
         "bounds": bounds,
         "state": len(settings.state),
     }
+
+
+def _closed(results: str, folder: str) -> tuple[str, tuple[str, ...]] | None:
+    """Return folder and names of what a plug-in in a folder may not read of the results."""
+    if not results:
+        return None
+    place = Path(results).resolve()
+    if folder and Path(folder).resolve().is_relative_to(place):
+        return str(place), ("rows", "checks", "exports", "fits")  # it lies among the results itself
+    return str(place.parent), (place.name,)
 
 
 def _places(kind: str, folder: str) -> list[str]:

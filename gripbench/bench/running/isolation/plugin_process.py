@@ -11,27 +11,23 @@ estimates of the last one are there.
 
 from __future__ import annotations
 
-import base64
 import contextlib
 import dataclasses
 import gc
+import io
 import os
-import random
+import shutil
 import socket
 import struct
 import sys
 import threading
 import time
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any, NoReturn
 
-import numba
 import numpy as np
-from numba.core.caching import NullCache
-from numba.core.dispatcher import Dispatcher
 
-from gripbench.bench.catalogue.arrays import given_state
-from gripbench.bench.catalogue.declarations import Declaration, Source, declaration_of
+from gripbench.bench.catalogue.declarations import Declaration
 from gripbench.bench.running.execution import (
     Observation,
     SkippedError,
@@ -43,7 +39,6 @@ from gripbench.bench.running.isolation.confinement import (
     confine,
     end_children,
     end_with,
-    part_from_parent,
 )
 from gripbench.bench.running.isolation.fits import fit_answer
 from gripbench.bench.running.isolation.lines import ServedLine
@@ -55,28 +50,44 @@ from gripbench.bench.running.isolation.messages import (
     message_bytes,
     read_message,
 )
-from gripbench.bench.running.isolation.trials import Trial, has_batch, perform
+from gripbench.bench.running.isolation.plugin_loading import (
+    Plugin,
+    enter_scratch,
+    load_plugin,
+    seed_generators,
+)
+from gripbench.bench.running.isolation.trials import Trial, perform
+from gripbench.bench.scoring.scoring import MISSING
 from gripbench.envs.plants.simulation import Simulation
 from gripbench.envs.signals import record_type
 from gripbench.errors import GripbenchError, describe_error
-from gripbench.methods import drivers
-from gripbench.methods.contract import CompiledMethod
-from gripbench.sources import source_files
 
 
 def serve(forks: bool) -> NoReturn:
     """Answer the run that started this interpreter, over standard input and output."""
     read, write = os.dup(0), os.dup(0 if forks else 1)
     nothing = os.open(os.devnull, os.O_RDWR)
-    for descriptor in (0, 1, 2):
+    for descriptor in (0, 1, 2) if forks else (0,):
         os.dup2(nothing, descriptor)
     os.close(nothing)
+    if not forks:
+        _print_to(2)  # what the run gave for it
     Simulation.__new__ = _refuse  # type: ignore[method-assign]
     if forks:
+        os.close(write)  # no plug-in gets a way to the run
         _start_plugins(socket.socket(fileno=read))
     line = ServedLine(read, write)
     line.send({"process": os.getpid()})
     _serve_plugin(line, forks=False)
+
+
+def _print_to(descriptor: int) -> None:
+    """Have all that this process prints go to a descriptor, at once: it may end any time."""
+    for output in {1, 2} - {descriptor}:
+        os.dup2(descriptor, output)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(line_buffering=True, errors="backslashreplace")
 
 
 def _refuse(*_: Any, **__: Any) -> NoReturn:
@@ -91,7 +102,7 @@ def _start_plugins(control: socket.socket) -> NoReturn:
     plugins: set[int] = set()
     ServedLine(control.fileno(), control.fileno()).send({"process": os.getpid()})
     while True:
-        content, descriptors, _, _ = socket.recv_fds(control, 65536, 1)
+        content, descriptors, _, _ = socket.recv_fds(control, 65536, 2)
         if not content:
             end_children()
             os._exit(0)
@@ -100,8 +111,12 @@ def _start_plugins(control: socket.socket) -> NoReturn:
             process = os.fork()
             if process == 0:
                 control.close()
+                for shown in descriptors[1:]:
+                    _print_to(shown)
+                    os.close(shown)
                 _serve_plugin(ServedLine(descriptors[0], descriptors[0]), forks=True)
-            os.close(descriptors[0])
+            for descriptor in descriptors:
+                os.close(descriptor)
             plugins.add(process)
             control.sendall(message_bytes({"process": process}))
         else:
@@ -140,32 +155,17 @@ def _taken(content: bytes) -> Any:
     return take
 
 
-@dataclasses.dataclass(frozen=True)
-class _Plugin:
-    """A plug-in that this process has loaded."""
-
-    source: Source
-    variant: str
-    parameters: dict[str, Any]
-    declaration: Declaration
-    batch: bool
-    expected: dict[str, str]
-    state: bytes
-
-    def make(self) -> Any:
-        return given_state(self.source.make(self.variant, self.parameters), self.state)
-
-
 def _serve_plugin(line: ServedLine, forks: bool) -> NoReturn:
     """Load one plug-in, then serve its cells."""
     if forks:
         end_with(os.getppid())
     request = line.message()
-    confine(request["memory"])
+    closed = request["closed"]
+    confine(request["memory"], (closed[0], tuple(closed[1])) if closed else None)
     audit.install()
     before = _shared_by_forks()
     try:
-        plugin = _load(request, line.receive(request["state"]))
+        plugin = load_plugin(request, line.receive(request["state"]))
     except MemoryError:
         line.send({"status": "out of memory", "reason": ""})
     except BaseException as error:  # SystemExit too
@@ -178,14 +178,17 @@ def _serve_plugin(line: ServedLine, forks: bool) -> NoReturn:
                 "status": "ok",
                 "declaration": dataclasses.asdict(plugin.declaration),
                 "batch": plugin.batch,
+                "online": plugin.online,
                 "expected": plugin.expected,
                 "shared": shared,
                 "read": audit.report(),
             }
         )
         if shared:
-            _fork_cells(line, plugin)
-        _serve_request(line, plugin, line.message())
+            _fork_cells(line, plugin, request["scratch"])
+        content = line.message()
+        enter_scratch(request["scratch"])
+        _serve_request(line, plugin, content)
     os._exit(0)
 
 
@@ -211,59 +214,7 @@ def _shared_by_forks() -> set[str]:
     return found | {str(place) for place, rights in mapped if rights.startswith(b"rw-s")}
 
 
-def _load(request: dict[str, Any], state: bytes) -> _Plugin:
-    _seed(request["seed"])
-    if request["folder"]:
-        os.chdir(request["folder"])
-    if request["bounds"]:
-        _check_bounds()
-    sys.path.extend(place for place in request["path"] if place not in sys.path)
-    payload = base64.b64decode(request["payload"])
-    source = Source(request["kind"], request["target"], payload)
-    variant, parameters = request["variant"], request["parameters"]
-    method = source.make(variant, parameters)
-    declaration = declaration_of(method, variant, parameters)
-    _forget_compiled(declaration)
-    _compile(method)
-    expected = {
-        str(check): str(reason)
-        for check, reason in dict(getattr(method, "expected_failures", {})).items()
-    }
-    return _Plugin(source, variant, parameters, declaration, has_batch(method), expected, state)
-
-
-def _check_bounds() -> None:
-    """Have numba compile with bounds checking, and nothing taken from its cache without."""
-    numba.config.BOUNDSCHECK = 1
-    Dispatcher.enable_caching = lambda self: None  # type: ignore[method-assign]
-
-
-def _forget_compiled(declaration: Declaration) -> None:
-    """Leave numba's files of an earlier run alone where they may hold what has changed.
-
-    They are valid while the file and what it imports by name is the same. Where the plug-in read
-    more than that, its values may be constants in the compiled code: that is compiled afresh.
-    """
-    read = {Path(name) for kind, name, _ in audit.report()["seen"] if kind != "environment"}
-    followed = source_files(Path(declaration.file)) if declaration.file else set()
-    if read <= followed:
-        return
-    for module in list(sys.modules.values()):
-        file = getattr(module, "__file__", None) or ""
-        if file and Path(file) in read:
-            for value in list(vars(module).values()):
-                if isinstance(value, Dispatcher):
-                    value._cache = NullCache()  # type: ignore[attr-defined]
-
-
-def _compile(method: Any) -> None:
-    """Compile a step before any clock runs; no code of the plug-in is called for it."""
-    if isinstance(method, CompiledMethod) and type(method).update is CompiledMethod.update:
-        with contextlib.suppress(Exception):  # the first sample will say what is wrong
-            drivers.compile_single(method)
-
-
-def _fork_cells(line: ServedLine, plugin: _Plugin) -> NoReturn:
+def _fork_cells(line: ServedLine, plugin: Plugin, scratch: str) -> NoReturn:
     control = socket.socket(fileno=line.read)
     while True:
         content, descriptors, _, _ = socket.recv_fds(control, 1 << 20, 2)
@@ -275,16 +226,17 @@ def _fork_cells(line: ServedLine, plugin: _Plugin) -> NoReturn:
         if process == 0:
             control.close()
             end_with(parent)
-            part_from_parent()
+            enter_scratch(os.path.join(scratch, str(os.getpid())))
             _serve_request(ServedLine(*descriptors), plugin, request)
         for descriptor in descriptors:
             os.close(descriptor)
         _, status = os.waitpid(process, 0)
         end_children()
+        shutil.rmtree(os.path.join(scratch, str(process)), ignore_errors=True)
         line.send({"ended": os.waitstatus_to_exitcode(status)})
 
 
-def _serve_request(line: ServedLine, plugin: _Plugin, request: dict[str, Any]) -> NoReturn:
+def _serve_request(line: ServedLine, plugin: Plugin, request: dict[str, Any]) -> NoReturn:
     if "trial" in request:
         _serve_trial(line, plugin, request)
     if "fit" in request:
@@ -292,10 +244,10 @@ def _serve_request(line: ServedLine, plugin: _Plugin, request: dict[str, Any]) -
     _serve_cell(line, plugin, request)
 
 
-def _serve_trial(line: ServedLine, plugin: _Plugin, request: dict[str, Any]) -> NoReturn:
+def _serve_trial(line: ServedLine, plugin: Plugin, request: dict[str, Any]) -> NoReturn:
     """Try the method over samples that come all at once: not to be scored."""
     try:
-        _seed(request["seed"])
+        seed_generators(request["seed"])
         declaration = plugin.declaration
         kind = record_type((*declaration.sensors, "time"))
         length = request["samples"]
@@ -304,7 +256,7 @@ def _serve_trial(line: ServedLine, plugin: _Plugin, request: dict[str, Any]) -> 
         trial = Trial(plugin.make, declaration, request["vehicle"], observations, request["period"])
         found = perform(request["trial"], trial)
         lengths = [len(item) for item in found]
-        answer = message_bytes({"status": "ok", "lengths": lengths})
+        answer = message_bytes({"status": "ok", "lengths": lengths, "read": audit.report()})
         answer += b"".join(np.ascontiguousarray(item).tobytes() for item in found)
     except BaseException as error:
         answer = message_bytes(_failure(error))
@@ -312,20 +264,20 @@ def _serve_trial(line: ServedLine, plugin: _Plugin, request: dict[str, Any]) -> 
     os._exit(0)
 
 
-def _serve_fit(line: ServedLine, plugin: _Plugin, request: dict[str, Any]) -> NoReturn:
+def _serve_fit(line: ServedLine, plugin: Plugin, request: dict[str, Any]) -> NoReturn:
     """Have the method fitted on the drives that come."""
     try:
-        _seed(request["seed"])
+        seed_generators(request["seed"])
         line.put(fit_answer(plugin.make, request["fit"], line.receive, audit.report))
     except BaseException as error:
         line.put(message_bytes(_failure(error)))
     os._exit(0)
 
 
-def _serve_cell(line: ServedLine, plugin: _Plugin, request: dict[str, Any]) -> NoReturn:
+def _serve_cell(line: ServedLine, plugin: Plugin, request: dict[str, Any]) -> NoReturn:
     """Run the method over the samples that come, one by one."""
     try:
-        _seed(request["seed"])
+        seed_generators(request["seed"])
         method = plugin.make()
         Observation.method = plugin.declaration.name
         method.reset(VehicleOnPaper(request["vehicle"]), request["step"])
@@ -343,6 +295,7 @@ def _samples(line: ServedLine, method: Any, declaration: Declaration) -> None:
     request = struct.Struct(f"=QQ{len(names)}d")
     reply = struct.Struct(f"=QQQQQ{len(outputs)}d")
     nothing = (0.0,) * len(outputs)
+    values: Sequence[float] = (MISSING,) * len(outputs)
     clock, process = time.perf_counter_ns, os.getpid
     while True:
         nonce, index, *sample = request.unpack(line.receive(request.size))
@@ -356,7 +309,7 @@ def _samples(line: ServedLine, method: Any, declaration: Declaration) -> None:
             began = clock()
             given = method.update(obs)
             took = clock() - began
-            values = numbers_of(given, outputs)
+            values = numbers_of(given, outputs, values)
         except BaseException as error:  # SystemExit too
             content = message_bytes(_failure(error))
             head = reply.pack(nonce, index, process(), FAILURE, len(content), *nothing)
@@ -370,10 +323,3 @@ def _failure(error: BaseException) -> dict[str, Any]:
         return {"status": "out of memory", "reason": ""}
     status = "skipped" if isinstance(error, SkippedError) else "failed"
     return {"status": status, "reason": describe_error(error), "read": audit.report()}
-
-
-def _seed(seed: str) -> None:
-    """Seed the global generators, so that a method that draws from them repeats itself."""
-    number = int(seed, 16)
-    random.seed(number)
-    np.random.seed([number >> shift & 0xFFFFFFFF for shift in (0, 32, 64, 96)])  # noqa: NPY002

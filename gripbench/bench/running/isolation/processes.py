@@ -19,8 +19,12 @@ from typing import Any
 
 import gripbench
 from gripbench.bench.running.isolation.confinement import end_tree
+from gripbench.bench.running.isolation.landlock import landlock_version
 from gripbench.bench.running.isolation.lines import LateError, Line
 from gripbench.bench.running.isolation.messages import message_bytes, read_message
+from gripbench.bench.running.isolation.outputs import Shown
+from gripbench.envs.hidden_draws import VARIABLE as SECRET
+from gripbench.envs.hidden_draws import salt
 from gripbench.errors import GripbenchError, InputError, unknown
 
 FORKS = sys.platform == "linux"
@@ -28,6 +32,9 @@ FORKS = sys.platform == "linux"
 
 STARTING = 120.0
 """Time [s] in which an empty interpreter has to start."""
+
+SHOWING = 1.0
+"""Time [s] that is waited for the last words of a method that has ended."""
 
 START = """
 import importlib.util, sys
@@ -147,6 +154,7 @@ class PluginProcess:
         self._starter = starter
         self._control: socket.socket | None = None
         self._process: subprocess.Popen[bytes] | None = None
+        self._shown: Shown | None = None
 
     def open_cell(self, content: dict[str, Any]) -> Line:
         """Ask for a cell and return the line over which its samples go."""
@@ -210,6 +218,8 @@ class PluginProcess:
         self.line.close()
         if self._control is not None:
             self._control.detach()
+        if self._shown is not None:
+            self._shown.finish(SHOWING)
         return code
 
 
@@ -244,15 +254,18 @@ class _Starter:
                 f"{self._process.returncode}"
             ) from None
 
-    def start(self) -> PluginProcess:
+    def start(self, shown: Shown | None) -> PluginProcess:
         ours, theirs = socket.socketpair()
+        given = [theirs.fileno(), *([shown.write] if shown else [])]
         with self._lock:
-            socket.send_fds(self._control, [message_bytes({"start": True})], [theirs.fileno()])
+            socket.send_fds(self._control, [message_bytes({"start": True})], given)
             answer = self._receive(STARTING)
         theirs.close()
+        if shown is not None:
+            os.close(shown.write)
         descriptor = ours.fileno()
         process = PluginProcess(Line(descriptor, descriptor), answer["process"], self)
-        process._control = ours
+        process._control, process._shown = ours, shown
         return process
 
     def end(self, number: int, grace: float) -> int | None:
@@ -287,7 +300,7 @@ _starters: dict[tuple[str, str], _Starter] = {}
 _lock = threading.Lock()
 
 
-def start_plugin(kind: str = "", folder: str = "") -> PluginProcess:
+def start_plugin(kind: str = "", folder: str = "", name: str = "") -> PluginProcess:
     """Return a new process that waits for a plug-in to load.
 
     Parameters
@@ -296,31 +309,43 @@ def start_plugin(kind: str = "", folder: str = "") -> PluginProcess:
         Kind of sandbox, of `SANDBOXES`.
     folder
         The plug-in's folder, which it has to see.
+    name
+        What it prints is shown on standard error under this name; empty: it is not.
 
     Raises
     ------
     GripbenchError
         If no interpreter can be started.
+    InputError
+        If seeds are hidden and a method could find the secret here.
     """
+    if salt() and not kind and not landlock_version():
+        raise InputError(
+            f"{SECRET} is set, and this system cannot keep a method from reading it in the memory "
+            "of this process: use Linux with Landlock (5.13), or --sandbox bubblewrap"
+        )
+    shown = Shown(name) if name else None
     if sandbox_kind(kind) == "" and not FORKS:
-        return _alone()
+        return _alone(shown)
     serves = (kind, folder if kind else "")
     with _lock:
         starter = _starters.get(serves)
         if starter is None or not starter.alive:
             starter = _starters[serves] = _Starter(kind, folder)
-        return starter.start()
+        return starter.start(shown)
 
 
-def _alone() -> PluginProcess:
+def _alone(shown: Shown | None) -> PluginProcess:
     """Return an interpreter that serves one plug-in and one cell."""
     child = subprocess.Popen(
         _command(forks=False),
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
+        stderr=shown.write if shown else subprocess.DEVNULL,
         env=environment(),
     )
+    if shown is not None:
+        os.close(shown.write)
     assert child.stdin is not None
     assert child.stdout is not None
     read, write = os.dup(child.stdout.fileno()), os.dup(child.stdin.fileno())
@@ -329,7 +354,7 @@ def _alone() -> PluginProcess:
     line = Line(read, write)
     deadline = time.monotonic() + STARTING
     process = PluginProcess(line, child.pid, None)
-    process._process = child
+    process._process, process._shown = child, shown
     try:
         read_message(lambda length: line.receive(length, deadline))
     except (LateError, EOFError, OSError, ValueError):

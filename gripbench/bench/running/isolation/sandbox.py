@@ -8,8 +8,11 @@ the cell that it was working on is lost. `plugin_process` is the other side.
 
 from __future__ import annotations
 
+import shutil
 import time
 from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
@@ -30,6 +33,7 @@ from gripbench.bench.running.isolation.loading import (
     generator_seed,
     loading_message,
     read_by,
+    scratch_folder,
 )
 from gripbench.bench.running.isolation.messages import (
     ESTIMATES,
@@ -40,6 +44,7 @@ from gripbench.bench.running.isolation.messages import (
     reply_type,
     requests_of,
 )
+from gripbench.bench.running.isolation.prefixes import LooksAheadError, run_over_prefixes
 from gripbench.bench.running.isolation.processes import PluginProcess, start_plugin
 from gripbench.envs.signals import record_type
 from gripbench.errors import LONGEST, InputError, one_line
@@ -69,6 +74,7 @@ class Sandbox:
         self._process: PluginProcess | None = None
         self._loaded: tuple[Settings, Loaded] | None = None
         self._read: dict[str, Any] = {}
+        self._scratch = ""
 
     def declare(self, source: Source, variant: str, parameters: dict[str, Any]) -> Declaration:
         """Return what a method declares.
@@ -113,17 +119,30 @@ class Sandbox:
         CellFailure
             With status `failed`, `timeout` or `skipped` and the reason.
         """
-        found = self.load(Settings(source, variant, parameters, state)).declaration
+        settings = Settings(source, variant, parameters, state)
+        loaded = self.load(settings)
+        found = loaded.declaration
         if (found.sensors, found.outputs) != (declaration.sensors, declaration.outputs):
             raise CellFailure("failed", "it declares other sensors or estimates than before")
         selected = select_channels(observations, found.sensors)
-        return self._run(found, vehicle, selected, period)
+        if loaded.online:
+            return self._run(found, vehicle, selected, period)
+        try:
+            estimates, batch = run_over_prefixes(
+                partial(self.perform, settings), vehicle, selected, period
+            )
+        except LooksAheadError as error:
+            raise CellFailure("failed", str(error), read=self._read) from None
+        runtime = runtime_of(np.empty(0), period, batch)
+        return Outcome(estimates, runtime, self._read, over_prefixes=True)
 
     def close(self) -> None:
         """End the process and everything that it started."""
         process, self._process, self._loaded = self._process, None, None
         if process is not None:
             process.end(grace=0.0)
+        if self._scratch:
+            shutil.rmtree(self._scratch, ignore_errors=True)
 
     def load(self, settings: Settings) -> Loaded:
         """Load a plug-in, unless it is the one that is there.
@@ -138,8 +157,10 @@ class Sandbox:
             if before == settings:
                 return loaded
         self.close()
-        message = loading_message(settings, self.limits, self._bounds)
-        self._process = process = start_plugin(self.limits.sandbox, message["folder"])
+        self._scratch = scratch_folder()
+        message = loading_message(settings, self.limits, self._bounds, self._scratch)
+        name = Path(settings.source.target.rstrip(":")).name if self.limits.show else ""
+        self._process = process = start_plugin(self.limits.sandbox, message["folder"], name)
         line, limit = process.line, max(self.limits.time, LOADING)
         deadline = time.monotonic() + limit
         answer = self._answer(line, deadline, limit, message, settings.state)
@@ -147,6 +168,7 @@ class Sandbox:
             loaded = Loaded(
                 declaration_from(answer["declaration"]),
                 answer.get("batch") is True,
+                answer.get("online") is True,
                 {str(name): str(text) for name, text in dict(answer["expected"]).items()},
             )
         except (KeyError, TypeError, ValueError, InputError) as error:
@@ -189,6 +211,7 @@ class Sandbox:
         try:
             line.put(selected.tobytes(), deadline)
             answer = self._answer(line, deadline, limit)
+            self._read = read_by(answer) or self._read
             lengths = answer.get("lengths")
             if not isinstance(lengths, list) or len(lengths) > 2:
                 raise ValueError("no trial")

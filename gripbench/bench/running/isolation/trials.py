@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from gripbench.bench.catalogue.declarations import Declaration
-from gripbench.bench.running.execution import execute, numbers_of, run_online
-from gripbench.bench.scoring.scoring import EstimateError, check_estimates
+from gripbench.bench.running.execution import execute, numbers_of, run_online, takes_samples
+from gripbench.bench.scoring.scoring import MISSING, EstimateError, check_estimates
 from gripbench.envs.signals import record_type
 
 Records = npt.NDArray[Any]
@@ -67,6 +67,17 @@ def _run(trial: Trial, method: Any) -> Records:
     return estimates.copy()
 
 
+def _whole(trial: Trial) -> list[Records]:
+    """Run over all samples at once; return the estimates and a record of the time of a step [s]."""
+    found = execute(
+        trial.create(), trial.declaration, trial.vehicle, trial.observations, trial.period,
+        timed=False,
+    )  # fmt: skip
+    outputs = trial.declaration.outputs
+    check_estimates(found.estimates, outputs, len(trial.observations))
+    return [found.estimates.copy(), _records([[found.runtime.batch] * len(outputs)], outputs)]
+
+
 def _online(trial: Trial, method: Any) -> Records:
     return run_online(method, trial.declaration, trial.vehicle, trial.observations)
 
@@ -85,16 +96,21 @@ def _reused(trial: Trial) -> list[Records]:
     buffer: dict[str, float] = {}
     given: list[Any] = []
     first: list[list[float]] = []
+    last = [MISSING] * len(outputs)
     for sample in trial.observations.tolist():
         buffer.update(zip(names, sample, strict=True))
         before = dict(buffer)
         given.append(method.update(buffer))
-        first.append(numbers_of(given[-1], outputs))
+        last = numbers_of(given[-1], outputs, last)
+        first.append(last)
         if not _same_dict(buffer, before):
             raise EstimateError("update changes the observation that it is given")
         for name in names:  # whoever looks at the old sample later finds this
             buffer[name] = math.nan
-    later = [numbers_of(item, outputs) for item in given]
+    later, last = [], [MISSING] * len(outputs)
+    for item in given:
+        last = numbers_of(item, outputs, last)
+        later.append(last)
     return [_records(first, outputs), _records(later, outputs)]
 
 
@@ -113,7 +129,8 @@ def _records(values: list[list[float]], outputs: tuple[str, ...]) -> Records:
 
 def _pickled(trial: Trial) -> list[Records]:
     method = trial.create()
-    run_online(method, trial.declaration, trial.vehicle, trial.observations[:100])
+    if takes_samples(method):
+        run_online(method, trial.declaration, trial.vehicle, trial.observations[:100])
     twin = pickle.loads(pickle.dumps(method))
     return [_run(trial, method), _run(trial, twin)]
 
@@ -128,11 +145,12 @@ def _timed(trial: Trial) -> list[Records]:
         timed=True,
     ).runtime
     outputs = trial.declaration.outputs
-    return [_records([[runtime.p50 or 0.0] * len(outputs)], outputs)]
+    return [_records([[runtime.p50 or runtime.batch] * len(outputs)], outputs)]
 
 
 FORMS: dict[str, Callable[[Trial], list[Records]]] = {
     "run": lambda trial: [_run(trial, trial.create())],
+    "whole": _whole,
     "run in two": lambda trial: [_run(trial, trial.create()), _run(trial, trial.create())],
     "online": lambda trial: [_online(trial, trial.create())],
     "reset": _twice,
@@ -140,6 +158,6 @@ FORMS: dict[str, Callable[[Trial], list[Records]]] = {
     "pickled": _pickled,
     "timed": _timed,
 }
-"""Ways to try a method: a run in its fastest form; in two new ones; online; online twice with
-`reset` between; with one dict for all samples (as given, as found later); as it is and unpickled;
-timed (one record whose fields are the median time of a step [s])."""
+"""Ways to try a method: a run in its fastest form; the same with its time; in two new ones;
+online; online twice with `reset` between; with one dict for all samples (as given, as found later);
+as it is and unpickled; timed (one record whose fields are the median time of a step [s])."""

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gripbench.envs.drivers.profiles import breakpoints, segment_records
+from gripbench.envs.hidden_draws import entropy
 from gripbench.envs.plants.longitudinal import integrators
 from gripbench.envs.plants.longitudinal.paper_solver import (
     STOP_EVERY,
@@ -249,4 +250,4 @@ class LongitudinalSimulation(Simulation):
 
 def _jump_stream(seed: int) -> np.random.Generator:
     """Return the stream of the process noise: one of its own, apart from the sensors'."""
-    return np.random.default_rng(np.random.SeedSequence([seed, 0x57484545]))
+    return np.random.default_rng(np.random.SeedSequence(entropy(seed, 0x57484545)))
