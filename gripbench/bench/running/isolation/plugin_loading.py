@@ -14,7 +14,7 @@ from typing import Any
 
 import numba
 import numpy as np
-from numba.core.caching import Cache, NullCache
+from numba.core.caching import Cache, NullCache, _CacheLocator
 from numba.core.dispatcher import Dispatcher
 
 from gripbench.bench.catalogue.arrays import given_state
@@ -111,6 +111,7 @@ def enter_scratch(scratch: str) -> None:
     audit.ignore(scratch)
     os.environ["TMPDIR"] = tempfile.tempdir = scratch
     Cache.save_overload = lambda *_: None  # type: ignore[method-assign]
+    _CacheLocator.ensure_cache_path = lambda _: None  # what is stored is read where it lies
     part_from_parent(scratch)
 
 
