@@ -301,7 +301,7 @@ def _row(line: Mapping[Any, Any], target: str, timings: Timings, format_: str) -
         "place": _place(line),
         "nees_band": _range(line["nees_low"], line["nees_high"], ".2f"),
         "percent_90": _percent(line["coverage_90"]),
-        "initials": "".join(sorted(map(_initial, instruments_of(line["reads"])))),
+        "initials": "".join(sorted(map(initial, instruments_of(line["reads"])))),
         "beats_guess": _times(line["beats_guess"], 100.0),
         "beats_next": _times(line["beats_next"], 100.0),
         "elsewhere": _range(line["elsewhere_from"], line["elsewhere_to"], ".3f"),
