@@ -52,7 +52,7 @@ def _step(state, obs, params, est):
             bank.x[j, 1] = obs.yaw_rate
             bank.P[j, 0, 0], bank.P[j, 1, 1] = params.speed_y_std**2, 1.0
     elif span > 0.0:
-        mix(bank, -np.expm1(-params.change_rate * span))
+        mix(bank, -np.expm1(-params.change_rate * span), 1.0)
         for j in range(_K):
             take(bank, j, filter)
             predict_track(

@@ -12,6 +12,8 @@ friction with a filter of its own over
   steep and removes the drift of the integration.
 - Errors of a tyre model last, so its measurement has the variance of an error with a correlation
   time; likelihoods inherit that, and the weights do not become certain of noise.
+- One more hypothesis is a *bank of the road that changes*: its tyres grip, its friction is that of
+  the prior, and its accelerometer offset walks fast. Without it a bank is a slide on ice.
 - Classes of friction are Markovian (`blocks.hypotheses`) and return to the prior where nothing is
   excited: the variance of the friction then says that it is not known.
 - The longitudinal speed comes from `blocks.speed_fusion`; braking and traction take their share of
@@ -57,6 +59,8 @@ from gripbench.methods.contract import CompiledMethod, Parameter, compiled
 V_Y, RATE, OFFSET, FRONT, REAR, STEER, MU = range(7)
 STATES = 7
 CLASSES = 8
+BANKING = CLASSES  # the hypothesis behind the classes: the bank of the road changes
+GRIP = 1.0  # friction at which its tyres do not slide
 _LEAST_CLASS, _LARGEST_CLASS = log(0.1), log(1.1)
 _WIDTH = (_LARGEST_CLASS - _LEAST_CLASS) / (CLASSES - 1)
 
@@ -65,7 +69,9 @@ _STATE = np.dtype(
     [
         ("speed", SPEED_STATE),
         ("filter", filter_type(STATES)),
-        ("bank", bank_type(CLASSES, STATES)),
+        ("bank", bank_type(CLASSES + 1, STATES)),
+        ("center", np.float64, (CLASSES + 1,)),  # ln mu to which a hypothesis returns
+        ("width", np.float64, (CLASSES + 1,)),  # its standard deviation there
         ("motion", np.float64, (2, 7)),
         ("roll", np.float64),
         ("roll_rate", np.float64),
@@ -80,36 +86,33 @@ _STATE = np.dtype(
 
 @compiled
 def _start(state, params):
-    _start_bank(state, params, params.friction_mean, params.friction_spread)
-
-
-@compiled
-def _start_prior(state, params):
-    _start_bank(state, params, params.friction_prior, params.friction_prior_std)
-
-
-@compiled
-def _start_bank(state, params, mean, spread):
-    """Set every class to the same first state, and weights by the prior of the friction."""
+    """Set every hypothesis to the same first state, and weights by the prior of the friction."""
     bank = state.bank
-    total = 0.0
+    total, first, second = 0.0, 0.0, 0.0
     for j in range(CLASSES):
         center = _LEAST_CLASS + j * _WIDTH
         mu = exp(center)
-        away = (mu - mean) / spread
+        away = (mu - params.friction_mean) / params.friction_spread
         bank.prior[j] = mu * exp(-0.5 * away * away) + 1e-4  # a class is as wide as its mu
         total += bank.prior[j]
-        bank.x[j, MU] = center
+        first += bank.prior[j] * center
+        second += bank.prior[j] * center * center
+        state.center[j], state.width[j] = center, params.class_width * _WIDTH
+    for j in range(CLASSES):
+        bank.prior[j] *= (1.0 - params.banking_share) / total
+    bank.prior[BANKING] = params.banking_share
+    state.center[BANKING] = first / total
+    state.width[BANKING] = sqrt(second / total - (first / total) ** 2)
+    for j in range(CLASSES + 1):
+        bank.weight[j] = bank.prior[j]
+        bank.x[j, MU] = state.center[j]
         bank.P[j, V_Y, V_Y] = params.speed_y_std**2
         bank.P[j, RATE, RATE] = 0.01
         bank.P[j, OFFSET, OFFSET] = params.offset_y_std**2
         bank.P[j, FRONT, FRONT] = params.stiffness_std**2
         bank.P[j, REAR, REAR] = params.stiffness_std**2
         bank.P[j, STEER, STEER] = params.steer_offset_std**2
-        bank.P[j, MU, MU] = (params.class_width * _WIDTH) ** 2
-    for j in range(CLASSES):
-        bank.prior[j] /= total
-        bank.weight[j] = bank.prior[j]
+        bank.P[j, MU, MU] = state.width[j] ** 2
 
 
 @compiled
@@ -143,8 +146,8 @@ def _limits(mu, accel_x, params):
 
 
 @compiled
-def _evaluate(state, x, steer, speed, accel_x, params):
-    front, rear = _limits(exp(x[MU]), accel_x, params)
+def _evaluate(state, j, x, steer, speed, accel_x, params):
+    front, rear = _limits(GRIP if j == BANKING else exp(x[MU]), accel_x, params)
     motion(
         speed, x, steer + x[STEER],
         params.cornering_stiffness_front * exp(x[FRONT]),
@@ -154,11 +157,12 @@ def _evaluate(state, x, steer, speed, accel_x, params):
 
 
 @compiled
-def _row(state, row, h):
+def _row(state, j, row, h):
     """Copy a row of the motion's slopes into the order of the states."""
     out = state.motion
     h[V_Y], h[RATE], h[OFFSET] = out[row, 1], out[row, 2], 0.0
-    h[FRONT], h[REAR], h[STEER], h[MU] = out[row, 4], out[row, 5], out[row, 6], out[row, 3]
+    h[FRONT], h[REAR], h[STEER] = out[row, 4], out[row, 5], out[row, 6]
+    h[MU] = 0.0 if j == BANKING else out[row, 3]
 
 
 @compiled
@@ -169,14 +173,15 @@ def _predict(state, j, span, steer, speed, accel_x, accel_y, params):
     """
     filter = state.filter
     x, F, Q, h = filter.x, filter.F, filter.Q, filter.h
-    _evaluate(state, x, steer, speed, accel_x, params)
-    _row(state, 1, h)
+    _evaluate(state, j, x, steer, speed, accel_x, params)
+    _row(state, j, 1, h)
     stiffness = params.cornering_stiffness_front * exp(x[FRONT])
     stiffness += params.cornering_stiffness_rear * exp(x[REAR])
     # share of the linear tyres' slope that is left: 1 where they grip, 0 where both slide
     gripping = min(max(-state.motion[0, 1] * params.mass * speed / stiffness, 0.0), 1.0)
-    walk = params.offset_y_walk + params.bank_walk * gripping
-    center = _LEAST_CLASS + j * _WIDTH
+    changing = params.banking_walk if j == BANKING else params.bank_walk
+    walk = params.offset_y_walk + changing * gripping
+    center, width = state.center[j], state.width[j]
     kept = exp(-span / params.class_time)
     for i in range(STATES):
         for k in range(STATES):
@@ -200,13 +205,21 @@ def _predict(state, j, span, steer, speed, accel_x, accel_y, params):
     Q[RATE, RATE] = (params.yaw_rate_walk**2 + unsure) * span
     Q[OFFSET, OFFSET] = walk * walk * span
     Q[FRONT, FRONT] = Q[REAR, REAR] = params.stiffness_walk**2 * span
-    Q[MU, MU] = (1.0 - kept * kept) * (params.class_width * _WIDTH) ** 2
+    Q[MU, MU] = (1.0 - kept * kept) * width * width
     predict_covariance(filter)
-    return score_of(correct_scalar(filter, -x[V_Y], usual), filter.P[V_Y, V_Y] + usual)
+    score = score_of(correct_scalar(filter, -x[V_Y], usual), filter.P[V_Y, V_Y] + usual)
+    if j == BANKING:  # so is a steep bank
+        usual = params.usual_bank**2 / span
+        h[V_Y], h[OFFSET] = 0.0, 1.0
+        score += score_of(
+            correct_scalar(filter, -x[OFFSET], usual), filter.P[OFFSET, OFFSET] + usual
+        )
+        score -= score_of(0.0, usual)  # its constant, which the other hypotheses do not have
+    return score
 
 
 @compiled
-def _correct(state, span, steer, speed, accel_x, accel_y, rate, params):
+def _correct(state, j, span, steer, speed, accel_x, accel_y, rate, params):
     """Take yaw rate and lateral force where they are known; return the log-likelihood."""
     filter = state.filter
     x, h = filter.x, filter.h
@@ -218,8 +231,8 @@ def _correct(state, span, steer, speed, accel_x, accel_y, rate, params):
         spread = filter.P[RATE, RATE] + variance
         score += score_of(correct_scalar(filter, rate - x[RATE], variance), spread)
     if accel_y == accel_y:
-        _evaluate(state, x, steer, speed, accel_x, params)
-        _row(state, 0, h)
+        _evaluate(state, j, x, steer, speed, accel_x, params)
+        _row(state, j, 0, h)
         lasting = params.model_floor**2 + (params.model_error * accel_y) ** 2
         variance = lasting * params.model_time / span
         spread = lasting
@@ -244,12 +257,12 @@ def _advance(state, params):
     accel_y = state.sum_accel_y / state.sum_accels if state.sum_accels > 0.0 else np.nan
     rate = state.sum_rate / state.sum_rates if state.sum_rates > 0.0 else np.nan
     bank, filter = state.bank, state.filter
-    mix(bank, -np.expm1(-params.change_rate * span))
-    for j in range(CLASSES):
+    mix(bank, -np.expm1(-params.change_rate * span), params.copied_share)
+    for j in range(CLASSES + 1):
         take(bank, j, filter)
         used = accel_y if accel_y == accel_y else state.accel_y
         bank.score[j] = _predict(state, j, span, steer, speed, accel_x, used, params)
-        bank.score[j] += _correct(state, span, steer, speed, accel_x, accel_y, rate, params)
+        bank.score[j] += _correct(state, j, span, steer, speed, accel_x, accel_y, rate, params)
         put(bank, j, filter)
     weigh(bank)
 
@@ -265,7 +278,7 @@ def _gather(state, obs, params):
     if state.started == 0.0:
         if obs.yaw_rate == obs.yaw_rate:
             state.started = 1.0
-            for j in range(CLASSES):
+            for j in range(CLASSES + 1):
                 state.bank.x[j, RATE] = obs.yaw_rate
         return
     if not obs.elapsed > 0.0:
@@ -296,7 +309,7 @@ def _step(state, obs, params, est):
     speed_y, variance = moments(bank, V_Y)
     state.speed_y = speed_y
     mean, square = 0.0, 0.0
-    for j in range(CLASSES):
+    for j in range(CLASSES + 1):
         spread = bank.P[j, MU, MU]
         mu = exp(bank.x[j, MU] + 0.5 * spread)
         mean += bank.weight[j] * mu
@@ -340,6 +353,7 @@ class SideslipFrictionBank(CompiledMethod):
         Parameter("friction_mean", 0.45, "-", "Mean of the friction before the drive", 0.1, 1.2),
         Parameter("friction_spread", 0.35, "-", "Its standard deviation", 0.02, 2.0),
         Parameter("change_rate", 0.03, "1/s", "Rate at which the friction changes", 1e-4, 5.0),
+        Parameter("copied_share", 0.0, "-", "Changes that bring their state along", 0.0, 1.0),
         Parameter("class_width", 0.4, "-", "Standard deviation of ln mu in a class", 0.05, 2.0),
         Parameter("class_time", 2.0, "s", "Time in which ln mu returns to its class", 0.05, 60.0),
         Parameter("window_time", 0.01, "s", "Samples of this time are taken as one", 1e-3, 0.1),
@@ -358,10 +372,15 @@ class SideslipFrictionBank(CompiledMethod):
         Parameter(
             "bank_walk", 0.15, "m/s^2/sqrt(s)", "Walk of the bank while tyres grip", 0.0, 3.0
         ),
+        Parameter("banking_share", 0.1, "-", "Prior of a bank that changes", 1e-6, 0.9),
+        Parameter(
+            "banking_walk", 0.8, "m/s^2/sqrt(s)", "Walk of the bank where it changes", 0.0, 5.0
+        ),
         Parameter("stiffness_std", 0.12, "-", "Relative error of the stiffness", 1e-3, 0.5),
         Parameter("stiffness_walk", 0.003, "1/sqrt(s)", "Walk of the stiffness", 0.0, 0.2),
         Parameter("steer_offset_std", 2e-3, "rad", "Error of the steering angle's zero", 1e-5, 0.1),
         Parameter("usual_sideslip", 0.05, "rad sqrt(s)", "Sideslip that is usual", 0.01, 10.0),
+        Parameter("usual_bank", 1.0, "m/s^2 sqrt(s)", "Share of g by a usual bank", 0.1, 10.0),
         Parameter("speed_y_std", 0.2, "m/s", "Lateral velocity at the start", 1e-3, 5.0),
     )
     state = _STATE

@@ -20,7 +20,7 @@ the friction; without excitation it returns to the prior.
 
 from __future__ import annotations
 
-from math import asin, atan, exp, expm1, sqrt, tan
+from math import exp, sqrt
 
 import numpy as np
 
@@ -34,6 +34,19 @@ from gripbench.methods.blocks.axle_friction import (
     front_load,
     rear_load,
 )
+from gripbench.methods.blocks.change_detection import (
+    CHANGE_STATE,
+    chance_of_change,
+    has_changed,
+)
+from gripbench.methods.blocks.fast_forces import (
+    FORCE_PARAMETERS,
+    FORCE_STATE,
+    steady_turn,
+    tyre_slope,
+    write_forces,
+)
+from gripbench.methods.blocks.inverse_slip import inverse_slip
 from gripbench.methods.blocks.kalman import correct_scalar, filter_type, predict_covariance
 from gripbench.methods.contract import CompiledMethod, Parameter, Variant, compiled
 
@@ -42,15 +55,13 @@ STATES = 9
 
 _SUMS = ("span", "count", "wheel_front", "wheel_rear", "torque_front", "torque_rear", "accel_x")
 _STATE = np.dtype(
-    [("filter", filter_type(STATES))]
+    [("filter", filter_type(STATES)), ("change", CHANGE_STATE), ("forces", FORCE_STATE)]
     + [(f"sum_{name}", np.float64) for name in _SUMS]
     + [
         (name, np.float64)
         for name in (
             "wheel_front", "wheel_rear", "started", "sum_gps", "sum_gps_time", "gps_count",
-            "end_front", "end_rear", "rise",
-            "fall", "steady_front", "steady_rear", "slope_front", "slope_rear", "accel_x",
-            "slow_newton", "slow_front", "slow_rear", "newton_power", "wheel_power", "common_power",
+            "end_front", "end_rear",
         )
     ]
 )  # fmt: skip
@@ -65,37 +76,9 @@ def _clear(state):
 
 
 @compiled
-def inverse_slip(share, params):
-    """Return the slip at which the tyre gives a share of its peak force, and d slip / d share.
-
-    Parameters
-    ----------
-    share
-        Force over mu F_z, cut to within -0.95 and 0.95.
-    params
-        Record with the Magic Formula factors.
-    """
-    share = min(max(share, -0.95), 0.95)
-    angle = asin(share) / params.magic_c
-    target = tan(angle)
-    u = target
-    for _ in range(8):  # u (1 - E) + E atan(u) = target; monotonic for E <= 1
-        value = u * (1.0 - params.magic_e) + params.magic_e * atan(u) - target
-        u -= value / (1.0 - params.magic_e + params.magic_e / (1.0 + u * u))
-    slip = u / params.magic_b
-    _, slope = magic_formula_slope(slip, params.magic_b, params.magic_c, params.magic_e)
-    return slip, 1.0 / max(slope, 1e-3)
-
-
-@compiled
 def _start(state, params):
-    _start_filter(state, params, params.friction_mean, params.friction_spread)
-
-
-@compiled
-def _start_filter(state, params, mean, spread):
     x, P = state.filter.x, state.filter.P
-    ratio = spread / mean
+    mean, ratio = params.friction_mean, params.friction_spread / params.friction_mean
     x[FLEX] = (1.0 + ratio * ratio) / mean
     P[FLEX, FLEX] = (ratio / mean) ** 2 * (1.0 + 3.0 * ratio * ratio)
     x[RADIUS_FRONT] = x[RADIUS_REAR] = params.radius_mean
@@ -226,42 +209,9 @@ def _axle(state, front, span, rolling, force, load, rate, params):
     return along * residual / sqrt(spread)  # of a curve that has bent over: 0
 
 
-@inlined
-def _steady(turn, wheel, rate, params):
-    """Return a wheel's acceleration [rad/s^2]: that of the car unless the wheel spins or locks."""
-    rolling = rate / params.wheel_radius
-    return turn if abs(turn - rolling) > 10.0 + params.spin_share * abs(wheel) else rolling
-
-
 @compiled
-def _steepness(state, front, force, load, params):
-    """Return the slope of an axle's force to its slip [N] at the end of the window."""
-    x = state.filter.x
-    peak = load * x[MASS] / x[FLEX]
-    turn = state.wheel_front if front else state.wheel_rear
-    rolling = params.wheel_radius * turn * (1.0 + x[RADIUS_FRONT if front else RADIUS_REAR])
-    slip = (rolling - x[SPEED]) / max(rolling, x[SPEED], params.lowest_speed)
-    if abs(slip) < params.bend_slip:
-        slip, _ = inverse_slip(force / peak, params)
-    else:
-        slip *= exp(x[STIFFNESS])
-    _, slope = magic_formula_slope(slip, params.magic_b, params.magic_c, params.magic_e)
-    return max(peak * exp(x[STIFFNESS]) * slope, 1.0)
-
-
-@compiled
-def _detect(state, evidence, variance, params):
-    """Cumulate the evidence for a change of 1/mu; open its variance where it is enough."""
-    state.rise = max(0.0, state.rise + evidence - params.drift)
-    state.fall = max(0.0, state.fall - evidence - params.drift)
-    if max(state.rise, state.fall) > params.threshold:
-        state.rise, state.fall = 0.0, 0.0
-        state.filter.P[FLEX, FLEX] += variance
-
-
-@compiled
-def _window(state, params, spread):
-    """Take the samples of a window; `spread` is the prior deviation of the friction."""
+def _window(state, params):
+    """Take the samples of a window."""
     filter = state.filter
     x, P = filter.x, filter.P
     span, count = state.sum_span, state.sum_count
@@ -277,17 +227,13 @@ def _window(state, params, spread):
     force_rear = (state.sum_torque_rear / count - inertia * turn_rear) / radius
     _newton(state, span, force_front + force_rear, accel, params)
     load_front, load_rear = front_load(params), rear_load(params)
-    prior = (spread / params.friction_mean**2) ** 2
-    evidence = _axle(
-        state, True, span, radius * state.sum_wheel_front / count, force_front, load_front, rate,
-        params,
-    )  # fmt: skip
-    evidence += _axle(
-        state, False, span, radius * state.sum_wheel_rear / count, force_rear, load_rear, rate,
-        params,
-    )  # fmt: skip
-    if abs(force_front) + abs(force_rear) > 2.0 * params.least_force:
-        _detect(state, 0.7071 * evidence, prior, params)
+    prior = (params.friction_spread / params.friction_mean**2) ** 2
+    wheel_front, wheel_rear = radius * state.sum_wheel_front, radius * state.sum_wheel_rear
+    evidence = _axle(state, True, span, wheel_front / count, force_front, load_front, rate, params)
+    evidence += _axle(state, False, span, wheel_rear / count, force_rear, load_rear, rate, params)
+    excited = abs(force_front) + abs(force_rear) > 2.0 * params.least_force
+    if excited and has_changed(state.change, 0.7071 * evidence, params):
+        P[FLEX, FLEX] += prior
     x[FLEX] = min(max(x[FLEX], 0.85), 15.0)
     x[MASS] = min(max(x[MASS], 0.7), 1.6)
     x[STIFFNESS] = min(max(x[STIFFNESS], -0.6), 0.6)
@@ -296,56 +242,18 @@ def _window(state, params, spread):
         for i in range(STATES):
             P[FLEX, i] *= shrink
             P[i, FLEX] *= shrink
-    state.steady_front = -inertia / radius * _steady(turn_front, state.wheel_front, rate, params)
-    state.steady_rear = -inertia / radius * _steady(turn_rear, state.wheel_rear, rate, params)
-    state.slope_front = _steepness(state, True, force_front, load_front, params)
-    state.slope_rear = _steepness(state, False, force_rear, load_rear, params)
+    forces, taken, peak = state.forces, -inertia / radius, x[MASS] / x[FLEX]
+    forces.steady_front = taken * steady_turn(turn_front, state.wheel_front, rate, params)
+    forces.steady_rear = taken * steady_turn(turn_rear, state.wheel_rear, rate, params)
+    front, soft = radius * state.wheel_front * (1.0 + x[RADIUS_FRONT]), x[STIFFNESS]
+    rear = radius * state.wheel_rear * (1.0 + x[RADIUS_REAR])
+    forces.slope_front = tyre_slope(x[SPEED], front, load_front * peak, soft, force_front, params)
+    forces.slope_rear = tyre_slope(x[SPEED], rear, load_rear * peak, soft, force_rear, params)
     _clear(state)
 
 
 @compiled
-def _forces(state, obs, params, est):
-    """Write the axle forces: torque balance, and what passes faster by wheels and accelerometer.
-
-    Accelerometer and wheel speeds both see the fast part of the sum of the forces. What they have
-    in common is true; each counts by the share of its power that is common.
-    """
-    x = state.filter.x
-    radius = params.wheel_radius
-    front = obs.torque_front / radius + state.steady_front
-    rear = obs.torque_rear / radius + state.steady_rear
-    speed = max(x[SPEED], params.lowest_speed)
-    mass = params.mass * x[MASS]
-    newton = mass * (obs.accel_x - x[BIAS] + params.rolling_resistance * GRAVITY)
-    newton += params.drag * speed * speed - front - rear
-    wheel_front = state.slope_front * radius * obs.wheel_speed_front / speed
-    wheel_rear = state.slope_rear * radius * obs.wheel_speed_rear / speed
-    share = -expm1(-obs.elapsed / params.fast_time)
-    if obs.first or state.slope_front == 0.0 or state.slow_front == 0.0:
-        share = 1.0
-    state.slow_newton += share * (newton - state.slow_newton)
-    state.slow_front += share * (wheel_front - state.slow_front)
-    state.slow_rear += share * (wheel_rear - state.slow_rear)
-    newton -= state.slow_newton
-    wheel_front -= state.slow_front
-    wheel_rear -= state.slow_rear
-    wheels = wheel_front + wheel_rear
-    memory = -expm1(-obs.elapsed / params.power_time)
-    state.newton_power += memory * (newton * newton - state.newton_power)
-    state.wheel_power += memory * (wheels * wheels - state.wheel_power)
-    state.common_power += memory * (newton * wheels - state.common_power)
-    common = max(state.common_power, 0.0)
-    trust_wheels = min(common / max(state.wheel_power, 1e-9), 1.0)
-    trust_newton = min(common / max(state.newton_power, 1e-9), 1.0)
-    rest = trust_newton * (newton - trust_wheels * wheels)
-    squares = state.slope_front**2 + state.slope_rear**2
-    part = state.slope_front**2 / squares if squares > 0.0 else 0.5
-    est.force_x_front = front + trust_wheels * wheel_front + part * rest
-    est.force_x_rear = rear + trust_wheels * wheel_rear + (1.0 - part) * rest
-
-
-@compiled
-def _gather(state, obs, gps, gps_new, params, spread):
+def _gather(state, obs, gps, gps_new, params):
     """Add a sample to the window; take the window when it is long enough."""
     state.wheel_front, state.wheel_rear = obs.wheel_speed_front, obs.wheel_speed_rear
     filter = state.filter
@@ -371,7 +279,7 @@ def _gather(state, obs, gps, gps_new, params, spread):
         state.sum_gps_time += state.sum_span
         state.gps_count += 1.0
     if state.sum_span >= params.window_time - 1e-9:
-        _window(state, params, spread)
+        _window(state, params)
 
 
 @compiled
@@ -380,22 +288,27 @@ def _write(state, obs, params, est):
     mu = 1.0 / x[FLEX]
     ratio = min(P[FLEX, FLEX] / x[FLEX] ** 2, 0.25)
     est.mu_front = est.mu_rear = mu * (1.0 + ratio)
-    est.mu_front_variance = est.mu_rear_variance = mu * mu * ratio
+    variance = mu * mu * (ratio + params.shape_error**2)
+    # what a change that has not been found yet would make of it
+    changed = chance_of_change(state.change, params.change_odds, params)
+    away = params.friction_mean - est.mu_front
+    other = params.friction_spread**2 + away * away
+    est.mu_front_variance = est.mu_rear_variance = variance + changed * (other - variance)
     rate = obs.accel_x - x[BIAS] + x[GRADE]
     est.speed_x = x[SPEED] + state.sum_span * rate
     est.speed_x_variance = P[SPEED, SPEED]
-    _forces(state, obs, params, est)
+    write_forces(state.forces, obs, est.speed_x, obs.accel_x - x[BIAS], x[MASS], params, est)
 
 
 @compiled
 def _step(state, obs, params, est):
-    _gather(state, obs, obs.speed_gps, obs.speed_gps_new > 0.0, params, params.friction_spread)
+    _gather(state, obs, obs.speed_gps, obs.speed_gps_new > 0.0, params)
     _write(state, obs, params, est)
 
 
 @compiled
 def _step_production(state, obs, params, est):
-    _gather(state, obs, 0.0, False, params, params.friction_spread)
+    _gather(state, obs, 0.0, False, params)
     _write(state, obs, params, est)
 
 
@@ -449,19 +362,19 @@ class SlipDomainEkf(CompiledMethod):
         Parameter("slip_error", 2e-4, "-", "Lasting error of a slip", 0.0, 0.01),
         Parameter("model_time", 1.0, "s", "Correlation time of those errors", 1e-2, 10.0),
         Parameter("bend_slip", 0.04, "-", "Slip beyond which forces are compared", 0.005, 0.5),
+        Parameter("shape_error", 0.05, "-", "Error of mu by the curve's shape", 0.0, 0.5),
+        Parameter("change_odds", 0.02, "-", "Odds of a change not found yet", 0.0, 1.0),
         Parameter("drift", 0.6, "-", "Evidence of a window that counts as none", 0.0, 5.0),
         Parameter("threshold", 5.0, "-", "Evidence that is a change of friction", 0.5, 100.0),
         Parameter("least_force", 100.0, "N", "Force that tells of the friction", 0.0, 1e4),
         Parameter("lowest_speed", 0.5, "m/s", "Speed below which no slip is taken", 0.05, 10.0),
-        Parameter("spin_share", 0.25, "1/s", "Wheel acceleration over speed that spins", 0.0, 5.0),
-        Parameter("fast_time", 0.02, "s", "Forces that pass faster are seen directly", 1e-3, 1.0),
-        Parameter("power_time", 0.5, "s", "Time over which their power is taken", 1e-2, 10.0),
+        *FORCE_PARAMETERS,
     )
     variants = {
         "as_on_paper": {
             "friction_mean": 0.8,
             "radius_mean": 0.0,
-            "radius_std": 1e-4,
+            "radius_std": 1e-5,
             "radius_walk": 0.0,
             "radius_known": 3e-4,
             "stiffness_std": 0.01,
@@ -475,6 +388,7 @@ class SlipDomainEkf(CompiledMethod):
             "flex_walk": 0.01,
             "threshold": 6.0,
             "curve_error": 0.02,
+            "shape_error": 0.01,
             "slip_error": 5e-5,
             "model_time": 0.1,
         },

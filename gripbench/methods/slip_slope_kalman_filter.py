@@ -149,7 +149,7 @@ class SlipSlopeKalmanFilter(CompiledMethod):
         Parameter("slip_noise", 1e-4, "sqrt(s)", "Density of the slip's noise", 1e-7, 0.1),
         Parameter("slip_error", 3e-4, "-", "Lasting error of the line", 0.0, 0.01),
         Parameter("slip_time", 1.0, "s", "Correlation time of that error", 1e-2, 10.0),
-        Parameter("largest_slip", 0.03, "-", "Slip beyond which there is no line", 1e-3, 0.3),
+        Parameter("largest_slip", 0.015, "-", "Slip beyond which there is no line", 1e-3, 0.3),
         Parameter("lowest_speed", 1.0, "m/s", "Speed below which no slip is taken", 0.05, 10.0),
         Parameter("least_share", 0.02, "-", "Normalised force that tells of k", 0.0, 0.5),
         *CHANGE_PARAMETERS,

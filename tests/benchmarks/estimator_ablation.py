@@ -32,6 +32,8 @@ BANK = {
     "one class of friction": {"friction_spread": 0.02, "change_rate": 1e-4},
     "stiffness as on paper": {"stiffness_std": 1e-3, "stiffness_walk": 0.0},
     "steering zero as on paper": {"steer_offset_std": 1e-5},
+    "no hypothesis of a bank": {"banking_share": 1e-6},
+    "states are copied": {"copied_share": 1.0},
     "no bank of the road": {"bank_walk": 0.0, "offset_y_walk": 0.0},
     "any sideslip is usual": {"usual_sideslip": 10.0},
     "errors are white": {"model_time": 0.01},
@@ -44,6 +46,7 @@ SLIP = {
     "GPS has no age": {"gps_age": 0.0, "gps_age_std": 1e-5},
     "no steps of friction": {"threshold": 100.0},
     "errors are white": {"model_time": 0.02},
+    "variance of the filter alone": {"shape_error": 0.0, "change_odds": 0.0},
 }
 BASELINES = {
     "zero sideslip": ZeroSideslip(),

@@ -32,7 +32,7 @@ def test_a_bank_is_filterpys_interacting_multiple_model():
     imm = IMMEstimator(twins, prior.copy(), transition)
     filter = np.zeros(1, filter_type(n)).view(np.recarray)[0]
     for reading in np.cumsum(random.normal(size=40)):
-        mix(bank, leaving)
+        mix(bank, leaving, 1.0)
         for j in range(k):
             take(bank, j, filter)
             filter.F[:], filter.Q[:] = F, noises[j] * np.eye(n)
@@ -49,6 +49,21 @@ def test_a_bank_is_filterpys_interacting_multiple_model():
         mean, variance = moments(bank, 0)
         assert mean == pytest.approx(float(imm.x[0, 0]), rel=1e-6, abs=1e-9)
         assert variance == pytest.approx(float(imm.P[0, 0]), rel=1e-6)
+
+
+def test_a_change_that_copies_no_state_moves_the_weights_alone():
+    banks = [np.zeros(1, bank_type(3, 2)).view(np.recarray)[0] for _ in range(2)]
+    for bank, copied in zip(banks, (1.0, 0.0), strict=True):
+        bank.prior[:], bank.weight[:] = [0.5, 0.3, 0.2], [0.9, 0.09, 0.01]
+        bank.x[:] = np.arange(6.0).reshape(3, 2)
+        bank.P[:] = np.eye(2)
+        mix(bank, 0.1, copied)
+    np.testing.assert_allclose(
+        banks[0].weight, 0.9 * np.array([0.9, 0.09, 0.01]) + 0.1 * bank.prior
+    )
+    np.testing.assert_array_equal(banks[1].weight, banks[0].weight)
+    np.testing.assert_allclose(banks[1].mixed_x, banks[1].x)
+    np.testing.assert_allclose(banks[1].mixed_P, banks[1].P)
 
 
 def drive(n=3000, speed=15.0):

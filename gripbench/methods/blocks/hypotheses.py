@@ -36,7 +36,7 @@ def bank_type(hypotheses: int, states: int) -> np.dtype:
 
 
 @compiled
-def mix(bank, leaving):
+def mix(bank, leaving, copied):
     """Start a step: predicted weights, and for each hypothesis the mixture that leads to it.
 
     Parameters
@@ -45,18 +45,23 @@ def mix(bank, leaving):
         Record of `bank_type`.
     leaving
         Probability that the hypothesis changes in this step.
+    copied
+        Share of these changes that bring their state along; 1 is the algorithm of Blom &
+        Bar-Shalom. A hypothesis of small weight is mostly what has come to it: with 1 it has the
+        state and the spread of the one that wins, is unlikely for that alone, and never comes
+        back.
     """
     k, n = bank.x.shape
     x, P = bank.x, bank.P
     for j in range(k):
-        total = 0.0
+        total, flow = 0.0, 0.0
         for i in range(k):
-            change = leaving * bank.prior[j]
-            if i == j:
-                change += 1.0 - leaving
-            bank.share[i, j] = change * bank.weight[i]
+            come = leaving * bank.prior[j] * bank.weight[i]
+            stay = (1.0 - leaving) * bank.weight[i] if i == j else 0.0
+            bank.share[i, j] = copied * come + stay
+            flow += come + stay
             total += bank.share[i, j]
-        bank.score[j] = total
+        bank.score[j] = flow
         for i in range(k):
             bank.share[i, j] /= total
         for a in range(n):
