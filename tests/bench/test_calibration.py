@@ -20,7 +20,7 @@ from gripbench.bench.scoring.consistency import CONSISTENT, SILENT
 from gripbench.errors import InputError
 from gripbench.methods.contract import CompiledMethod, compiled
 
-SEEDS = 16
+SEEDS = 10
 
 
 @pytest.fixture(scope="module")
