@@ -138,7 +138,7 @@ def declaration_of(
         check_names(f"{name}: 'parameters'", [item.name for item in method.parameters])
         check_names(f"{name}: 'variants'", list(method.variants))
     own = (method.variant, method.settings) if compiled else (variant, parameters)
-    given |= training_of(method) | {"variant": own[0], "settings": dict(own[1])}
+    given |= training_of(method, parameters) | {"variant": own[0], "settings": dict(own[1])}
     given["file"] = str(getattr(sys.modules.get(type(method).__module__), "__file__", None) or "")
     return declaration_from(given, type(method).__name__)
 

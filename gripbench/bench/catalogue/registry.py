@@ -315,7 +315,9 @@ def _named_variant(path: Path, settings: Mapping[str, Any]) -> MethodSpec:
     trained = spec.trained
     if training is not None:
         trained = declared({**training, "seconds": given.record.get("seconds")})
-    return replace(spec, shown=f"{given.method}@{given.name}", trained=trained)
+    form = f":{spec.variant}" if spec.variant else ""
+    shown = f"{spec.declaration.name}{form}@{given.name}"
+    return replace(spec, shown=shown, trained=trained)
 
 
 def is_isolated(source: Source) -> bool:

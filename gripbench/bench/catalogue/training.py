@@ -7,6 +7,8 @@ file says by `trained` how it came to them.
 
 from __future__ import annotations
 
+import inspect
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, Self
@@ -96,28 +98,46 @@ class Trained:
     digest: str = ""
 
 
-def training_of(method: Any) -> dict[str, Any]:
-    """Return what an estimator says of its training, and the ranges that a search may look in."""
+def training_of(method: Any, parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what an estimator says of its training, and the ranges that a search may look in.
+
+    Parameters
+    ----------
+    method
+        An instance.
+    parameters
+        With which it was made.
+    """
     return {
         "fits": callable(getattr(method, "fit", None)),
         "trained_on": getattr(method, "trained_on", ()),
         "training_truth": getattr(method, "training_truth", ()),
         "trained": getattr(method, "trained", None),
-        "ranges": _ranges_of(method),
+        "ranges": _ranges_of(method, parameters),
     }
 
 
-def _ranges_of(method: Any) -> dict[str, Any]:
-    """Return low end, value and high end of every parameter that a search may change."""
+def _ranges_of(method: Any, parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Return low end, value and high end of every parameter that a search may change.
+
+    They are numbers with a finite range: of a plain class those in its `ranges`.
+    """
     given = getattr(method, "parameters", ())
-    settings = getattr(method, "settings", {})
     if isinstance(given, list | tuple) and all(isinstance(item, Parameter) for item in given):
-        return {
-            item.name: [item.low, settings.get(item.name, item.default), item.high]
-            for item in given
-            if isinstance(item.default, float) and abs(item.low) + abs(item.high) < float("inf")
-        }
-    return {}
+        settings = {**{item.name: item.default for item in given}, **parameters}
+        settings |= getattr(method, "settings", {})
+        found = {item.name: (item.low, settings[item.name], item.high) for item in given}
+        found = {name: ends for name, ends in found.items() if isinstance(ends[1], float)}
+    else:
+        found = {}
+    own = getattr(method, "ranges", None)
+    if isinstance(own, Mapping):
+        known = inspect.signature(type(method)).parameters
+        for name, ends in own.items():
+            default = known[name].default if name in known else None
+            low, high = ends if isinstance(ends, list | tuple) and len(ends) == 2 else (None, None)
+            found[name] = (low, parameters.get(name, default), high)
+    return found
 
 
 def checked_training(given: Mapping[str, Any], name: str) -> dict[str, Any]:
@@ -161,10 +181,21 @@ def checked_training(given: Mapping[str, Any], name: str) -> dict[str, Any]:
         "trained_on": tuple(on),
         "training_truth": tuple(truth),
         "trained": trained,
-        "ranges": {
-            str(key): (float(low), float(value), float(high))
-            for key, (low, value, high) in dict(given.get("ranges") or {}).items()
-        },
+        "ranges": _checked_ranges(given.get("ranges") or {}, name),
+    }
+
+
+def _checked_ranges(given: Mapping[str, Any], name: str) -> dict[str, tuple[float, float, float]]:
+    """Return the ranges that have two different and finite ends."""
+    for key, ends in given.items():
+        if not all(isinstance(end, float | int) and not isinstance(end, bool) for end in ends):
+            raise InputError(
+                f"{name}: 'ranges' must give '{key}' two numbers, and its default must be a number"
+            )
+    return {
+        key: (float(low), float(value), float(high))
+        for key, (low, value, high) in given.items()
+        if math.isfinite(low) and math.isfinite(high) and low < high
     }
 
 

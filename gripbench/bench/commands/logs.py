@@ -22,7 +22,6 @@ def register(app: typer.Typer) -> None:
     data.command("path")(path)
     app.add_typer(data, name="data", rich_help_panel=LOGS)
     app.command("recordings", rich_help_panel=LOGS)(recordings)
-    app.command("tune", rich_help_panel=LOGS)(tune)
     app.command("identify", rich_help_panel=LOGS)(identify)
 
 
@@ -139,42 +138,6 @@ def recordings(
         for path in write_pictures(sorted(drawn & set(PICTURES)), figures):
             print(f"drawn: {path}", file=sys.stderr)
     print_failures(frame, stderr=True)
-
-
-def tune(
-    recording: Annotated[str, typer.Argument(help=RECORDING)],
-    method: Annotated[str, typer.Argument(help="name[:variant] of a built-in method.")],
-    target: Annotated[str, typer.Option(help="Signal whose error counts.")] = "sideslip",
-    draws: Annotated[int, typer.Option(min=1, help="Settings to try.")] = 60,
-    out: Annotated[
-        Path | None,
-        typer.Option(help="Write the variant to this TOML file; run --method FILE.toml runs it."),
-    ] = None,
-    data: Annotated[
-        Path | None, typer.Option(help="Folder of the files instead of the one that is set.")
-    ] = None,
-) -> None:
-    """Tune a method on the training windows of a recording, over its parameters' ranges."""
-    from gripbench.bench.running.tuning import settings_text, tune_recording, write_variant
-    from gripbench.envs.signals import signal
-    from gripbench.logs.locations import use_data_folder
-    from gripbench.writing import check_writable
-
-    if out is not None:
-        check_writable(out)
-    use_data_folder(data)
-    tuned = tune_recording(recording, method, target, draws)
-    spans = ", ".join(f"{start:.3f} to {end:.3f} s" for start, end in tuned.windows)
-    print(
-        f"# {tuned.draws} trials, {target} on the training windows {spans}: RMS "
-        f"{tuned.before:.3g} {signal(target).unit} before, {tuned.after:.3g} after"
-    )
-    if tuned.undetermined:
-        print(f"# at an end of its range, so not settled: {', '.join(tuned.undetermined)}")
-    print(settings_text(tuned))
-    if out is not None:
-        write_variant(tuned, out)
-        print(f"# written to {out}")
 
 
 def identify(

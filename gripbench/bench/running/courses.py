@@ -128,7 +128,9 @@ def course_of(names: Sequence[str], folder: Path, each: int = EACH) -> Course:
 
 
 def _scenario(name: str, folder: Path) -> Scenario:
-    plain, _, _ = name.partition("@")
+    plain, mark, level = name.partition("@")
+    if mark and level.partition("+")[0] != str(TRAINING_LEVEL):
+        raise InputError(f"scenario '{name}': training drives are of level {TRAINING_LEVEL}")
     if not plain.endswith(".toml"):
         if plain not in all_scenario_files():
             raise unknown(

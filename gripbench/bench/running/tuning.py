@@ -8,8 +8,9 @@ range stay as they are, and so does what is fixed.
 
 from __future__ import annotations
 
+import json
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,16 +18,18 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gripbench.bench.catalogue.registry import MethodSpec, built_in_methods, choose_method
-from gripbench.bench.running.execution import SkippedError, execute, missing
+from gripbench.bench.catalogue.registry import MethodSpec, choose_method
+from gripbench.bench.catalogue.training import Training
+from gripbench.bench.running.estimating import Estimates, estimating
+from gripbench.bench.running.execution import SkippedError, missing
+from gripbench.bench.running.isolation.limits import CellFailure, Limits
 from gripbench.bench.running.recorded_logs import imported_of
 from gripbench.bench.running.recorded_scenarios import judged
-from gripbench.bench.scoring.scoring import DivergedError, at_lag, check_estimates
+from gripbench.bench.scoring.scoring import DivergedError, at_lag
 from gripbench.envs.recordings import Recording
 from gripbench.envs.signals import signal
-from gripbench.errors import InputError, unknown
+from gripbench.errors import InputError
 from gripbench.logs.vehicle.identification import inside
-from gripbench.methods.settings import Parameter
 from gripbench.writing import write_atomically
 
 BUDGET = 60
@@ -38,6 +41,7 @@ NOISE_LEVELS = ("_noise", "_walk", "_std", "_density")
 _WIDE = 10.0  # ratio of a range's ends from which it is searched by its logarithm
 
 Floats = npt.NDArray[np.float64]
+Ranges = Mapping[str, tuple[float, float, float]]
 
 
 @dataclass(frozen=True)
@@ -57,11 +61,13 @@ class Tuned:
     draws
         How many settings were tried.
     recording
-        Name of the recording.
+        Name of the recording, or what the drives are called.
     windows
         Training windows [s] on the log's clock, by run.
     undetermined
-        Parameters that ended at an end of their range: the log does not bound them.
+        Parameters that ended at an end of their range: the drives do not bound them.
+    training, seconds
+        Of simulated drives, which, and how long the search took [s].
     """
 
     method: str
@@ -73,22 +79,88 @@ class Tuned:
     recording: str = ""
     windows: tuple[tuple[float, float], ...] = ()
     undetermined: tuple[str, ...] = field(default=())
+    training: Training | None = None
+    seconds: float = 0.0
 
 
-def searched(method: str, fixed: Mapping[str, Any] = {}) -> list[Parameter]:
-    """Return the parameters of a built-in method that a search may change."""
-    name = method.partition(":")[0]
-    methods = built_in_methods()
-    if name not in methods:
-        raise unknown("method", name, methods)
-    return [
-        one
-        for one in methods[name].parameters
-        if isinstance(one.default, float)
-        and np.isfinite([one.low, one.high]).all()
-        and one.low < one.high
-        and one.name not in fixed
-    ]
+def searched(method: str, fixed: Mapping[str, Any] = {}) -> Ranges:
+    """Return low end, value and high end of each parameter that a search may change, by name."""
+    ranges = choose_method(method).declaration.ranges
+    return {name: ends for name, ends in ranges.items() if name not in fixed}
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a search found.
+
+    Attributes
+    ----------
+    settings
+        Parameters that are better than the present ones; empty: none are.
+    before, after
+        Error with the settings before and after.
+    undetermined
+        Parameters that ended at an end of their range.
+    """
+
+    settings: dict[str, float]
+    before: float
+    after: float
+    undetermined: tuple[str, ...]
+
+
+def search(
+    name: str,
+    ranges: Ranges,
+    error_of: Callable[[Mapping[str, float]], float],
+    draws: int,
+    seed: int = 0,
+) -> Found:
+    """Look for the settings with the smallest error.
+
+    Parameters
+    ----------
+    name
+        The method; the draws depend on it and the seed only.
+    ranges
+        Low end, present value and high end of each parameter.
+    error_of
+        Returns the error of a method with some settings; infinite where it fails.
+    draws
+        Settings to try beside the present ones.
+    seed
+        Of the draws.
+    """
+    from scipy.optimize import minimize
+    from scipy.stats import qmc
+
+    scale = _Scale(ranges)
+    before = error_of({})
+    best: tuple[float, Floats] = (before, scale.start)
+    failed = 1e6 * (1.0 + (before if np.isfinite(before) else 1.0))
+
+    def error(point: Floats) -> float:
+        nonlocal best
+        found = error_of(scale.settings(np.clip(point, 0.0, 1.0)))
+        if found < best[0]:
+            best = found, np.clip(point, 0.0, 1.0)
+        return found if np.isfinite(found) else failed
+
+    spread = (draws + 1) // 2
+    random = np.random.default_rng([seed, zlib.crc32(name.encode())])
+    points = qmc.Sobol(len(ranges), rng=random).random(1 << (spread - 1).bit_length())
+    for point in points[:spread]:
+        error(point)
+    if draws > spread:
+        minimize(
+            error, best[1], method="Nelder-Mead", bounds=[(0.0, 1.0)] * len(ranges),
+            options={"maxfev": draws - spread, "initial_simplex": _simplex(best[1])},
+        )  # fmt: skip
+    after, point = best
+    if not after < before:
+        return Found({}, before, before, ())
+    ends = [name for name, at in zip(ranges, point, strict=True) if at < 0.01 or at > 0.99]
+    return Found(scale.settings(point), before, after, tuple(ends))
 
 
 def tune(
@@ -99,12 +171,12 @@ def tune(
     draws: int = BUDGET,
     seed: int = 0,
 ) -> Tuned:
-    """Tune a built-in method for one target.
+    """Tune a method for one target.
 
     Parameters
     ----------
     method
-        `name[:variant]`.
+        Choice as `choose_method` takes it.
     recordings
         Runs of a recording with a window `train`.
     target
@@ -121,58 +193,34 @@ def tune(
     InputError
         If there is no training window, or the method has nothing to tune or cannot run.
     """
-    from scipy.optimize import minimize
-    from scipy.stats import qmc
-
     name = recordings[0].scenario
     training = [one for one in recordings if one.windows.get("train")]
     if not training:
         raise InputError(f"{name}: has no window 'train' to tune on")
     known = dict(fixed or {})
-    parameters = searched(method, known)
-    spec = choose_method(method, parameters=known)
-    if not parameters:
+    ranges = searched(method, known)
+    if not ranges:
         raise InputError(f"{method}: has no parameter with a range to tune")
-    start = np.array([float(spec.declaration.settings[one.name]) for one in parameters])  # type: ignore[arg-type]
-    scale = _Scale(parameters, start)
-    before = training_error(spec, training, target)
-    best: tuple[float, Floats] = (before, scale.unit(start))
 
-    def error(point: Floats) -> float:
-        nonlocal best
-        chosen = scale.settings(np.clip(point, 0.0, 1.0))
+    def error_of(chosen: Mapping[str, float]) -> float:
         try:
-            tried = choose_method(method, parameters=known | chosen)
-            found = training_error(tried, training, target)
+            tried = choose_method(method, parameters={**known, **chosen})
+            return training_error(tried, training, target)
         except DivergedError:
-            found = np.inf
-        if found < best[0]:
-            best = found, np.clip(point, 0.0, 1.0)
-        return found if np.isfinite(found) else 1e6 * (1.0 + before)
+            if not chosen:
+                raise
+            return np.inf
 
-    spread = (draws + 1) // 2
-    random = np.random.default_rng([seed, zlib.crc32(method.encode())])
-    points = qmc.Sobol(len(parameters), rng=random).random(1 << (spread - 1).bit_length())
-    for point in points[:spread]:
-        error(point)
-    if draws > spread:
-        minimize(
-            error, best[1], method="Nelder-Mead", bounds=[(0.0, 1.0)] * len(parameters),
-            options={"maxfev": draws - spread, "initial_simplex": _simplex(best[1])},
-        )  # fmt: skip
-    after, point = best
-    settings = known | (scale.settings(point) if after < before else {})
-    loose = tuple(
-        one.name
-        for one, place in zip(parameters, point, strict=True)
-        if after < before and (place < 0.01 or place > 0.99)
-    )
+    found = search(method, ranges, error_of, draws, seed)
     windows = tuple(
         (start + one.notes.get("time_origin", 0.0), end + one.notes.get("time_origin", 0.0))
         for one in training
         for start, end in one.windows["train"]
     )
-    return Tuned(method, target, settings, before, after, draws, name, windows, loose)
+    return Tuned(
+        method, target, known | found.settings, found.before, found.after, draws, name, windows,
+        found.undetermined,
+    )  # fmt: skip
 
 
 def training_error(spec: MethodSpec, recordings: Sequence[Recording], target: str) -> float:
@@ -190,6 +238,18 @@ def training_error(spec: MethodSpec, recordings: Sequence[Recording], target: st
         raise InputError(
             f"{spec.label}: does not estimate '{target}' but {', '.join(declaration.estimates)}"
         )
+    with estimating(spec, Limits()) as run:
+        total, count = _summed(spec, run, recordings, target)
+    if not count:
+        raise InputError(f"{spec.label}: nothing is known of '{target}' on the training windows")
+    return float(np.sqrt(total / count))
+
+
+def _summed(
+    spec: MethodSpec, run: Estimates, recordings: Sequence[Recording], target: str
+) -> tuple[float, int]:
+    """Return the sum of squared errors over all training windows, and the number of samples."""
+    declaration = spec.declaration
     total, count = 0.0, 0
     for recording in recordings:
         reason = missing(declaration, recording.vehicle, recording.observations.dtype.names or ())
@@ -199,14 +259,13 @@ def training_error(spec: MethodSpec, recordings: Sequence[Recording], target: st
         kept = int(np.searchsorted(recording.truth["time"], last, side="right"))
         part = at_lag(cut(recording, kept), declaration.lag)
         try:
-            outcome = execute(spec.make(), declaration, part.vehicle, part.observations, 0.0, False)
-        except SkippedError as error:
+            estimates = run(part.vehicle, part.observations)
+        except (SkippedError, CellFailure) as error:
             raise InputError(f"{spec.label}: {error}") from None
-        check_estimates(outcome.estimates, declaration.outputs, kept)
-        estimate = outcome.estimates[target]
+        estimate = estimates[target]
         if not np.isfinite(estimate).all():
             raise DivergedError(f"{target} is not finite")
-        truth = judged(part, outcome.estimates).truth
+        truth = judged(part, estimates).truth
         if target not in (truth.dtype.names or ()):
             known = [name for name in declaration.estimates if name in (truth.dtype.names or ())]
             raise InputError(
@@ -217,9 +276,7 @@ def training_error(spec: MethodSpec, recordings: Sequence[Recording], target: st
         difference = estimate[counted] - truth[target][counted]
         total += float(difference @ difference)
         count += len(difference)
-    if not count:
-        raise InputError(f"{spec.label}: nothing is known of '{target}' on the training windows")
-    return float(np.sqrt(total / count))
+    return total, count
 
 
 def cut(recording: Recording, rows: int) -> Recording:
@@ -244,13 +301,13 @@ def cut(recording: Recording, rows: int) -> Recording:
 class _Scale:
     """Parameters to points of the unit cube and back; wide ranges by their logarithm."""
 
-    def __init__(self, parameters: Sequence[Parameter], start: Floats) -> None:
-        self.names = [one.name for one in parameters]
-        self.low = np.array([one.low for one in parameters])
-        self.high = np.array([one.high for one in parameters])
+    def __init__(self, ranges: Ranges) -> None:
+        self.names = list(ranges)
+        self.low, start, self.high = np.array(list(ranges.values())).T
         lowest = np.where(self.low > 0.0, self.low, 1e-4 * np.abs(start))
         self.wide = (self.low >= 0.0) & (lowest > 0.0) & (self.high > _WIDE * lowest)
         self.low = np.where(self.wide, lowest, self.low)
+        self.start = self.unit(start)
 
     def unit(self, values: Floats) -> Floats:
         """Return values as a point of the unit cube."""
@@ -297,7 +354,9 @@ def tune_recording(place: str, method: str, target: str, draws: int = BUDGET) ->
 def settings_text(tuned: Tuned) -> str:
     """Return the settings as the lines of a channel map."""
     lines = [f"[settings.{tuned.method.partition(':')[0]}]"]
-    lines += [f"{key} = {value:.5g}" for key, value in tuned.settings.items()]
+    for key, value in tuned.settings.items():
+        shown = f"{value:.5g}" if isinstance(value, float) else json.dumps(value)
+        lines.append(f"{key} = {shown}")
     return "\n".join(lines)
 
 
@@ -309,21 +368,28 @@ def variant_name(tuned: Tuned) -> str:
 def write_variant(tuned: Tuned, path: Path) -> None:
     """Write the settings as a variant with its record: `--method FILE.toml` chooses it."""
     unit = signal(tuned.target).unit
+    drives = (
+        [f'recording = "{tuned.recording}"', f"windows = {[list(one) for one in tuned.windows]}"]
+        if tuned.training is None
+        else [f"seconds = {tuned.seconds:.6g}"]
+    )
     lines = [
-        f'method = "{tuned.method}"',
+        f"method = {json.dumps(tuned.method)}",
         f'name = "{variant_name(tuned)}"',
         "",
         "[settings]",
-        *(f"{key} = {float(value)!r}" for key, value in tuned.settings.items()),
+        *(f"{key} = {json.dumps(value)}" for key, value in tuned.settings.items()),
         "",
         "[record]",
-        f'recording = "{tuned.recording}"',
         f'target = "{tuned.target}"',
-        f"windows = {[list(window) for window in tuned.windows]}",
+        *drives,
         f"trials = {tuned.draws}",
         f'unit = "{unit}"',
         f"before = {tuned.before:.6g}",
         f"after = {tuned.after:.6g}",
-        f"at_an_end_of_its_range = {list(tuned.undetermined)}".replace("'", '"'),
+        f"at_an_end_of_its_range = {json.dumps(tuned.undetermined)}",
     ]
+    if tuned.training is not None:
+        said = tuned.training.model_dump(mode="json")
+        lines += ["", "[record.training]", *(f"{key} = {json.dumps(said[key])}" for key in said)]
     write_atomically(path, "\n".join(lines) + "\n")

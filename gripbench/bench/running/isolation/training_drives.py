@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from gripbench.bench.catalogue.declarations import Declaration
 from gripbench.bench.running.isolation.messages import message_bytes
+from gripbench.bench.scoring.scoring import at_lag
 from gripbench.envs.recordings import Recording
 from gripbench.envs.signals import record_type
 from gripbench.methods.samples import select_channels
@@ -63,6 +64,7 @@ class TrainingDrive:
 
 def training_drive(recording: Recording, declaration: Declaration) -> TrainingDrive:
     """Return what a method's `fit` is given of a recording."""
+    recording = at_lag(recording, declaration.lag)
     names = ("time", *declaration.estimates, *declaration.training_truth)
     known = [name for name in dict.fromkeys(names) if name in (recording.truth.dtype.names or ())]
     truth = np.empty(len(recording.truth), record_type(known))
