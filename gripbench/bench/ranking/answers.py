@@ -20,7 +20,7 @@ from gripbench.bench.scoring.consistency import SILENT
 from gripbench.envs.signals import IDEALISED, signal
 from gripbench.errors import InputError
 
-ROADS = ("dry", "wet", "snow", "ice", "changing", "real drive", "unknown")
+ROADS = ("any", "dry", "wet", "snow", "ice", "changing", "real drive", "unknown")
 """Kinds of road in the order of the table."""
 
 

@@ -13,6 +13,9 @@ from typing import Any
 from gripbench.bench.catalogue.scenarios import find_scenario
 from gripbench.bench.catalogue.suites import load_suite, suite_files
 from gripbench.bench.running.recorded_scenarios import PREFIX
+from gripbench.envs.populations.drives import friction_of
+from gripbench.envs.populations.population import load_population
+from gripbench.envs.scenarios import Scenario
 from gripbench.errors import GripbenchError
 
 ROADS: tuple[tuple[str, float], ...] = (("ice", 0.2), ("snow", 0.4), ("wet", 0.7))
@@ -104,18 +107,34 @@ def standing_of(board: Any) -> int:
 def road_of(scenario: str) -> str:
     """Return the kind of road of a scenario: `dry`, `wet`, `snow`, `ice`, `changing`.
 
-    A real drive is a `real drive`; a scenario that is no longer at hand is on an `unknown` road.
+    Where a population draws roads of several kinds it is `any`. A real drive is a `real drive`; a
+    scenario that is no longer at hand is on an `unknown` road.
     """
     if scenario.startswith(PREFIX):
         return "real drive"
     try:
-        found = sorted(_frictions(find_scenario(scenario)))
+        plain = find_scenario(scenario)
+        drawn = _drawn(plain)
     except GripbenchError:
         return "unknown"
+    found = sorted(drawn or _frictions(plain))
     if not found:
         return "unknown"
     kinds = [_kind(value) for value in (found[0], found[-1])]
-    return kinds[0] if kinds[0] == kinds[1] else "changing"
+    return kinds[0] if kinds[0] == kinds[1] else "any" if drawn else "changing"
+
+
+def _drawn(scenario: Scenario) -> list[float]:
+    """Return the least and the largest friction that seeds may draw; none where none is drawn."""
+    if not (scenario.level and scenario.population):
+        return []
+    population = load_population(scenario.population)
+    spread = population.spreads.get("road.friction")
+    if spread is None or spread.support[0] == spread.support[1]:
+        return []
+    usual = [population.usual_friction] if population.usual_friction else _frictions(scenario)
+    ends = (spread.centre + scenario.level * end for end in spread.support)
+    return [friction_of(value, end) for end in ends for value in usual]
 
 
 def _kind(friction: float) -> str:

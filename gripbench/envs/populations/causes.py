@@ -18,7 +18,8 @@ class Cause:
     name
         Its name: the table of the population's file, a dot, the key.
     unit
-        Unit of the deviation; `%/100` where it is relative.
+        Unit of the deviation; `relative` for a share of 1, `logit` for the friction of a road, see
+        `gripbench.envs.populations.drives.friction_of`.
     description
         What deviates.
     """
@@ -64,12 +65,12 @@ _TABLE = (
     Cause("tyre.shape", "-", "Shape of the force curve"),
     Cause("tyre.curve", _RELATIVE, "Shape factor C of the Magic Formula"),
     Cause("tyre.curvature", _RELATIVE, "Curvature factor E of the Magic Formula"),
-    Cause("road.friction", "log", "Friction level of the road"),
-    Cause("road.friction_right", "log", "Friction under the right wheels, where split"),
-    Cause("road.friction_step_1", "log", "Friction behind the first step"),
-    Cause("road.friction_step_2", "log", "Friction behind the second step"),
-    Cause("road.friction_step_3", "log", "Friction behind the third step"),
-    Cause("road.friction_step_4", "log", "Friction behind the fourth step"),
+    Cause("road.friction", "logit", "Friction level of the road"),
+    Cause("road.friction_right", "logit", "Friction under the right wheels, where split"),
+    Cause("road.friction_step_1", "logit", "Friction behind the first step"),
+    Cause("road.friction_step_2", "logit", "Friction behind the second step"),
+    Cause("road.friction_step_3", "logit", "Friction behind the third step"),
+    Cause("road.friction_step_4", "logit", "Friction behind the fourth step"),
     Cause("road.step_place_1", _RELATIVE, "Time or place of the first step"),
     Cause("road.step_place_2", _RELATIVE, "Time or place of the second step"),
     Cause("road.step_place_3", _RELATIVE, "Time or place of the third step"),
@@ -90,6 +91,9 @@ _TABLE = (
     Cause("drive.yaw_damping", _RELATIVE, "Driver's gain against yaw rate"),
     Cause("drive.reaction", _RELATIVE, "Driver's reaction time"),
     Cause("drive.speed_gain", _RELATIVE, "Driver's gain on the speed"),
+    Cause("drive.held_speed", "-", "Share of the answer to a slippery road that is no lower speed"),
+    Cause("drive.brake_timing", _RELATIVE, "Time at which the driver brakes"),
+    Cause("drive.brake_strength", _RELATIVE, "Deceleration that the driver asks for"),
 )  # fmt: skip
 
 CAUSES: dict[str, Cause] = {cause.name: cause for cause in _TABLE}

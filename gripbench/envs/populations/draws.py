@@ -167,9 +167,9 @@ def draw(
     def d(name: str) -> float:
         return found.get(name, 0.0)
 
-    limit = population.slip_limit if level else 0.0
+    limit, usual = (population.slip_limit, population.usual_friction) if level else (0.0, 0.0)
     try:
-        driven = drawn_scenario(scenario, d, tyre, limit)
+        driven = drawn_scenario(scenario, d, tyre, limit, usual)
     except ValueError as error:
         said = " ".join(str(error).split())
         raise InputError(

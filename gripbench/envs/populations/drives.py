@@ -39,8 +39,47 @@ _RESERVE = 0.1
 _LEAST_GAP = 1.0
 """Shortest stretch of one friction between two steps [s]."""
 
+SLIPPERIEST, GRIPPIEST = 0.08, 1.1
+"""Friction coefficients between which roads lie: wet ice and clean dry asphalt."""
 
-def drawn_scenario(scenario: Scenario, d: Deviation, tyre: str, slip_limit: float) -> Scenario:
+
+def friction_of(nominal: float, deviation: float) -> float:
+    """Return the friction coefficient of a road that deviates from a nominal one.
+
+    The logarithm of the coefficient over its range has log-odds, and those deviate: whatever is
+    drawn is a road, and no scenario's own surface says much of the friction of its draws.
+
+    Parameters
+    ----------
+    nominal
+        Friction coefficient of the scenario.
+    deviation
+        Of the log-odds; 0 gives the nominal value to the last bit.
+
+    Examples
+    --------
+    >>> [round(friction_of(0.25, deviation), 2) for deviation in (-3.0, 0.0, 3.0)]
+    [0.09, 0.25, 0.94]
+    """
+    if deviation == 0.0 or nominal <= 0.0:
+        return nominal
+    low, high = _limits(nominal)
+    odds = math.exp(_log_odds(nominal) + deviation)
+    return low * (high / low) ** (odds / (1.0 + odds))
+
+
+def _log_odds(friction: float) -> float:
+    low, high = _limits(friction)
+    return math.log(math.log(friction / low) / math.log(high / friction))
+
+
+def _limits(friction: float) -> tuple[float, float]:
+    return min(SLIPPERIEST, friction / 1.1), max(GRIPPIEST, 1.1 * friction)
+
+
+def drawn_scenario(
+    scenario: Scenario, d: Deviation, tyre: str, slip_limit: float, usual: float
+) -> Scenario:
     """Return a scenario with the road and the drive of one seed.
 
     Parameters
@@ -53,25 +92,34 @@ def drawn_scenario(scenario: Scenario, d: Deviation, tyre: str, slip_limit: floa
         Shape of the tyres' force curve; empty: the scenario's own.
     slip_limit
         Of a longitudinal car, see `Population.slip_limit`.
+    usual
+        Friction of the roads of the population, see `Population.usual_friction`.
     """
     changes: dict[str, Any] = {}
     if isinstance(scenario, LongitudinalScenario):
-        changes = _straight(scenario, d, slip_limit)
+        changes = _straight(scenario, d, slip_limit, _shift(scenario.friction[0].first, usual))
     elif isinstance(scenario, DrivenScenario):
-        changes = _driven(scenario, d)
+        changes = _driven(scenario, d, _shift(scenario.road.mu, usual))
     if tyre and hasattr(scenario, "tyre"):
         changes["tyre"] = tyre
     # Read anew, so that a draw that the model does not allow is an error and never a run.
     return type(scenario).model_validate(scenario.model_copy(update=changes).model_dump())
 
 
-def _straight(scenario: LongitudinalScenario, d: Deviation, slip_limit: float) -> dict[str, Any]:
+def _shift(nominal: float, usual: float) -> float:
+    """Return what takes the log-odds of a scenario's friction to those of a usual road."""
+    return _log_odds(usual) - _log_odds(nominal) if usual else 0.0
+
+
+def _straight(
+    scenario: LongitudinalScenario, d: Deviation, slip_limit: float, shift: float
+) -> dict[str, Any]:
     changes: dict[str, Any] = {
         "initial_speed": max(scenario.initial_speed + d("drive.initial_speed"), 0.0),
         "road_grade": scenario.road_grade + d("road.grade"),
         "grade_std": scenario.grade_std + d("road.grade_along"),
         "mu_std": scenario.mu_std + d("road.friction_along"),
-        "friction": _friction(scenario, d),
+        "friction": _friction(scenario, d, shift),
         "driver": scenario.driver.model_copy(
             update={
                 "front": _torque(scenario, scenario.driver.front, d),
@@ -87,7 +135,7 @@ def _straight(scenario: LongitudinalScenario, d: Deviation, slip_limit: float) -
     return changes
 
 
-def _friction(scenario: LongitudinalScenario, d: Deviation) -> tuple[Segment, ...]:
+def _friction(scenario: LongitudinalScenario, d: Deviation, shift: float) -> tuple[Segment, ...]:
     pieces = sorted(scenario.friction, key=lambda piece: piece.start)
     starts = [0.0]
     for number, piece in enumerate(pieces[1:], 1):
@@ -96,10 +144,9 @@ def _friction(scenario: LongitudinalScenario, d: Deviation) -> tuple[Segment, ..
     ends = [*starts[1:], max(pieces[-1].end, starts[-1] + _LEAST_GAP)]
     drawn = []
     for number, (piece, start, end) in enumerate(zip(pieces, starts, ends, strict=True)):
-        level = math.exp(
-            d("road.friction") + (d(f"road.friction_step_{number}") if number else 0.0)
-        )
-        values = {name: getattr(piece, name) * level for name in ("first", "last", "amplitude")}
+        by = shift + d("road.friction") + (d(f"road.friction_step_{number}") if number else 0.0)
+        values = {name: friction_of(getattr(piece, name), by) for name in ("first", "last")}
+        values["amplitude"] = piece.amplitude * (values["first"] / piece.first)
         drawn.append(piece.model_copy(update={**values, "start": start, "end": end}))
     return tuple(drawn)
 
@@ -134,12 +181,18 @@ def _on_sample(scenario: Scenario, time: float) -> float:
     return time if abs(place - round(place)) < 1e-9 else round(place) * scenario.sample_time
 
 
-def _driven(scenario: DrivenScenario, d: Deviation) -> dict[str, Any]:
-    # A driver feels how slippery it is: the acceleration scales with the friction, the speed
-    # with its root. The linear bicycle knows no friction.
-    slower = 1.0 if isinstance(scenario, BicycleScenario) else math.exp(0.5 * d("road.friction"))
+def _driven(scenario: DrivenScenario, d: Deviation, shift: float) -> dict[str, Any]:
+    # A driver feels how slippery it is, and the acceleration scales with the friction: by a speed
+    # with its root, or at the same speed by wider turns. A speed would otherwise tell the friction.
+    # On better grip some drive faster and some do not. The linear bicycle knows no friction.
+    ratio = 1.0
+    if not isinstance(scenario, BicycleScenario):
+        ratio = friction_of(scenario.road.mu, shift + d("road.friction")) / scenario.road.mu
+    held = min(max(d("drive.held_speed"), 0.0), 1.0)
+    slower = ratio ** (0.5 * (1.0 - held))
     speed = scenario.speed * (1.0 + d("drive.speed")) * slower
     strength, stretch = 1.0 + d("drive.amplitude"), 1.0 + d("drive.timing")
+    strength *= min(ratio, 1.0) ** held
     side = -1.0 if d("drive.side") < 0.0 else 1.0
     driver = scenario.driver
     gains = {key: getattr(driver, key) * (1.0 + d(cause)) for key, cause in _GAINS.items()}
@@ -155,11 +208,11 @@ def _driven(scenario: DrivenScenario, d: Deviation) -> dict[str, Any]:
         "driver": driver.model_copy(
             update={
                 **gains,
-                "brake_at": driver.brake_at * stretch,
-                "brake_deceleration": driver.brake_deceleration * strength,
+                "brake_at": driver.brake_at * (1.0 + d("drive.brake_timing")),
+                "brake_deceleration": driver.brake_deceleration * (1.0 + d("drive.brake_strength")),
             }
         ),
-        "road": _road(scenario.road, d, slower),
+        "road": _road(scenario.road, d, shift, slower),
     }
 
 
@@ -220,13 +273,12 @@ def _steering(steering: Steering, strength: float, stretch: float, side: float) 
     return steering.model_copy(update=changes)
 
 
-def _road(road: Road, d: Deviation, slower: float) -> Road:
-    level = math.exp(d("road.friction"))
-    after = level * math.exp(d("road.friction_step_1"))
+def _road(road: Road, d: Deviation, shift: float, slower: float) -> Road:
+    by = shift + d("road.friction")
     surfaces = tuple(
         surface.model_copy(
             update={
-                "mu": surface.mu * level * math.exp(d(f"road.friction_step_{number}")),
+                "mu": friction_of(surface.mu, by + d(f"road.friction_step_{number}")),
                 "start": surface.start * (1.0 + d(f"road.step_place_{number}")) * slower,
             }
         )
@@ -234,9 +286,9 @@ def _road(road: Road, d: Deviation, slower: float) -> Road:
     )
     return road.model_copy(
         update={
-            "mu": road.mu * level,
-            "mu_right": road.mu_right * level * math.exp(d("road.friction_right")),
-            "mu_after": road.mu_after * after,
+            "mu": friction_of(road.mu, by),
+            "mu_right": friction_of(road.mu_right, by + d("road.friction_right")),
+            "mu_after": friction_of(road.mu_after, by + d("road.friction_step_1")),
             "mu_jump_at": road.mu_jump_at * (1.0 + d("road.step_place_1")) * slower,
             "mu_std": road.mu_std + d("road.friction_along"),
             "bank": road.bank + d("road.bank"),

@@ -123,6 +123,9 @@ class Population(Configuration):
     slip_limit
         Slip ratio from which a longitudinal car's traction control and anti-lock brakes act;
         0: it has none.
+    usual_friction
+        Friction coefficient around which roads are drawn, whatever the scenario's own is, so that
+        no drive tells by itself what road it is on; 0: around the scenario's own.
     """
 
     name: str = Field(pattern=r"^[a-z][a-z0-9_]*$")
@@ -137,6 +140,7 @@ class Population(Configuration):
     instruments: Instruments = Instruments()
     correlations: tuple[Correlation, ...] = ()
     slip_limit: float = Field(default=0.0, ge=0.0, le=0.5)
+    usual_friction: float = Field(default=0.0, ge=0.0, le=1.0)
 
     @model_validator(mode="after")
     def _check_causes(self) -> Self:
