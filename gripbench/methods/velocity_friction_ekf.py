@@ -5,7 +5,8 @@ capture measures in both directions: what it finds of the friction then does not
 magnetometer and GPS give the sideslip. Errata are those of `friction_ekf`.
 
 Of its variance: that of `friction_ekf`: the error of the tyre model lasts, and is counted as
-white.
+white. The variant `lasting_errors` gives the tyre model an error of .35 m/s^2 that lasts a second,
+.35 sqrt(2 s) = .5 as a density, and lets the road change by .05 in a second.
 """
 
 from __future__ import annotations
@@ -41,6 +42,9 @@ class VelocityFrictionEkf(CompiledMethod):
     variances = ("mu",)
     vehicle_parameters = FRICTION_VEHICLE
     parameters = FRICTION_PARAMETERS
-    variants = {"small_car": {"least_speed": 0.8}}
+    variants = {
+        "small_car": {"least_speed": 0.8},
+        "lasting_errors": {"accel_y_density": 0.5, "mu_walk": 0.05},
+    }
     state = FRICTION_STATE
     step = staticmethod(_step)
