@@ -28,7 +28,7 @@ def entry_points(group: str) -> dict[str, importlib.metadata.EntryPoint]:
 
 
 @lru_cache(maxsize=1)
-def _every_point(places: tuple[tuple[str, int], ...]) -> importlib.metadata.EntryPoints:
+def _every_point(places: tuple[tuple[str, int], ...]) -> Any:
     del places  # the cache's key: a package may come while a notebook runs
     return importlib.metadata.entry_points()
 

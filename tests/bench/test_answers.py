@@ -11,7 +11,8 @@ from synthetic_rows import GPS, IDEAL, TORQUE, noisy_frame, noisy_rows, row
 from typer.testing import CliRunner
 
 from gripbench.bench.command_line import application
-from gripbench.bench.publishing.board_tables import answer_table, board_table, one_table
+from gripbench.bench.publishing.answer_table import answer_table
+from gripbench.bench.publishing.board_tables import board_table, one_table
 from gripbench.bench.publishing.leaderboard import build, text_of
 from gripbench.bench.publishing.report.content import found_boards, profile
 from gripbench.bench.publishing.report.critical import critical_differences

@@ -58,7 +58,7 @@ def leaderboard(
     """Build the leaderboard of stored rows; with --compare, fail if a method became worse."""
     from gripbench.bench.catalogue.scenarios import find_scenario
     from gripbench.bench.catalogue.suites import load_suite
-    from gripbench.bench.publishing.board_tables import answer_table
+    from gripbench.bench.publishing.answer_table import answer_table
     from gripbench.bench.publishing.leaderboard import build, read, usual_targets, write
     from gripbench.bench.publishing.regressions import changes_table
     from gripbench.bench.publishing.regressions import compare as compare_leaderboards

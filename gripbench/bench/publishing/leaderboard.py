@@ -18,7 +18,8 @@ from pydantic import Field
 
 import gripbench
 from gripbench.bench.catalogue.suites import load_suite, suite_files
-from gripbench.bench.publishing.board_tables import Timings, answer_table, board_table
+from gripbench.bench.publishing.answer_table import answer_table
+from gripbench.bench.publishing.board_tables import Timings, board_table
 from gripbench.bench.publishing.columns import Table
 from gripbench.bench.publishing.degradation_table import degradation_tables
 from gripbench.bench.publishing.tables import markdown

@@ -12,7 +12,7 @@ import pandas as pd
 
 import gripbench
 from gripbench.bench.catalogue.registry import choose_method
-from gripbench.bench.publishing.board_tables import answer_table
+from gripbench.bench.publishing.answer_table import answer_table
 from gripbench.bench.publishing.degradation_table import degradation_tables, every_line
 from gripbench.bench.publishing.figures.style import PAGE
 from gripbench.bench.publishing.leaderboard import uncertainty_boards
