@@ -48,6 +48,7 @@ FLOORS = (
     ("bench.catalogue",),
     ("bench.scoring",),
     ("bench.running", "bench.catalogue.check", "bench.catalogue.expectations"),
+    ("bench.bounds",),
     ("bench.ranking",),
     (
         "bench.publishing.columns",

@@ -56,6 +56,7 @@ def leaderboard(
     ] = None,
 ) -> None:
     """Build the leaderboard of stored rows; with --compare, fail if a method became worse."""
+    from gripbench.bench.bounds.stored import bounds_beside
     from gripbench.bench.catalogue.scenarios import find_scenario
     from gripbench.bench.catalogue.suites import load_suite
     from gripbench.bench.publishing.answer_table import answer_table
@@ -92,8 +93,9 @@ def leaderboard(
         clean = without_faults(rows)
         print(markdown(answer_table(answers(clean, targets or sorted(known - {""})))), end="")
         return
+    bounds = bounds_beside(results, rows["scenario"].unique())
     relative = read_timings(timings) if timings else None
-    current, boards = build(rows, relative, confidence, targets)
+    current, boards = build(rows, relative, confidence, targets, bounds)
     for path in write(out or results, current, boards):
         print(f"wrote {path}")
     if base is None:

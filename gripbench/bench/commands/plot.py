@@ -50,10 +50,19 @@ def plot(
     seeds: Annotated[
         int, typer.Option(min=1, help="Runs that reliability and nees are taken over.")
     ] = 20,
+    known: Annotated[
+        bool,
+        typer.Option(
+            "--known",
+            help="Shade where the sensors of these methods together cannot tell the signal (see "
+            "'gripbench bound'), and print each RMS error where they can.",
+        ),
+    ] = False,
     dpi: Annotated[int, typer.Option(min=30, max=1200, help="Dots an inch of the PNG.")] = 150,
 ) -> None:
     """Draw a signal of one run, or what methods state of their errors in it, as PNG and PDF."""
     from gripbench.bench.publishing.figures.calibration import nees_plot, reliability_plot
+    from gripbench.bench.publishing.figures.known_errors import knowable_errors
     from gripbench.bench.publishing.figures.run_plot import run_plot, usual_signal
     from gripbench.bench.publishing.figures.runs import Runs
     from gripbench.bench.publishing.figures.style import save, style
@@ -72,9 +81,13 @@ def plot(
         what = seed if draw == "run" else draw
         output = results / "plots" / f"{Path(scenario).stem}_{signal}_{what}"
     check_writable(output.parent / f"{output.name}.png")
+    bound = None
+    if known:
+        bound, lines = knowable_errors(runs, scenario, chosen, signal, seed)
+        typer.echo("\n".join(lines))
     with style():
         if draw == "run":
-            figure = run_plot(runs, scenario, chosen, signal, seed, start, end)
+            figure = run_plot(runs, scenario, chosen, signal, seed, start, end, bound)
         else:
             figure = over_runs[draw](runs, scenario, chosen, signal, seeds)
         paths = save(figure, output.parent, output.name.removesuffix(".png"), dpi)

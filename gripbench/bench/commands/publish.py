@@ -49,6 +49,7 @@ def publish(
     """
     import joblib
 
+    from gripbench.bench.bounds.stored import bounds_beside
     from gripbench.bench.catalogue.suites import load_suite, suite_files
     from gripbench.bench.papers.claims import paper_files
     from gripbench.bench.publishing.dataset import write_dataset
@@ -89,7 +90,8 @@ def publish(
     rows = rows_of_suites(read_rows(results), suites)
     rows = rows[rows["seed"] < seeds]
     targets = chosen_targets(rows, suites)
-    files = write(results, *build(rows, runtimes, CONFIDENCE, targets))
+    bounds = bounds_beside(results, rows["scenario"].unique())
+    files = write(results, *build(rows, runtimes, CONFIDENCE, targets, bounds))
     files += write_dataset(results, rows)
     say("leaderboard" if runtimes else "leaderboard, without runtimes: give --timings")
     configuration = {name: load_suite(name).model_dump(mode="json") for name in suites}

@@ -57,6 +57,7 @@ def rank(
     wins: Annotated[bool, typer.Option("--wins", help="Also who wins against whom.")] = False,
 ) -> None:
     """Rank the methods of stored rows with the confidence that their runs allow."""
+    from gripbench.bench.bounds.stored import bounds_beside
     from gripbench.bench.publishing.leaderboard import usual_targets
     from gripbench.bench.ranking.ranking import boards
     from gripbench.bench.running.store import read_rows
@@ -75,6 +76,7 @@ def rank(
         reference=reference,
         confidence=confidence,
         by=by,
+        bounds=bounds_beside(results, rows["scenario"].unique()),
     )
     show_boards(found, format_, wide, wins)
 

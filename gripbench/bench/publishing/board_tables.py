@@ -77,6 +77,11 @@ def _narrow(board: Board) -> tuple[Column, ...]:
             if board.guess
             else ()
         ),
+        *(
+            (Column("bound_ratio", "x bound", format=".3g"),)
+            if board.lines["bound_ratio"].notna().any()
+            else ()
+        ),
         # on the board of all methods what each reads takes its place
         *((Column("percent_next", "> next"),) if board.sensors or not board.guess else ()),
     ]
@@ -105,6 +110,16 @@ def _wide(board: Board, relative: bool) -> tuple[Column, ...]:
         Column("rmses", f"RMS ({percent})", unit),
         Column("uncertainty", "What it says of its error"),
         Column("nees_band", f"NEES of a consistent one ({percent})"),
+        *(
+            (
+                Column("bound", "Bound", unit, ".4g"),
+                Column("bound_ratio", "RMS / bound", format=".3g"),
+                Column("known_percent", "Can be known", "% of drives", ".0f"),
+                Column("below_bound", "Below what the sensors allow in"),
+            )
+            if board.lines["bound"].notna().any()
+            else ()
+        ),
         Column("skill", "Skill", format=".3f"),
         Column("beats_guess", "Better than a guess in", "% of drives", ".0f"),
         Column("beats_next", "Better than the next in", "% of drives", ".0f"),
@@ -142,6 +157,12 @@ def _notes(board: Board, wide: bool) -> tuple[str, ...]:
                 f"Skill: 1 - score / score of the best guess ({board.guess}); > guess, > next: "
                 "share of drives with less error than that guess, than the line below."
             )
+        if board.lines["bound_ratio"].notna().any():
+            runs = int(board.lines["bound_runs"].iloc[0])
+            notes.append(
+                "x bound: RMS over the least that any estimate with these sensors can have, in "
+                f"{runs} of the runs (docs/bounds.md)."
+            )
         useless = board.lines.loc[board.lines["verdict"] != "", "label"]
         if len(useless):
             notes.append(f"{NOT_BETTER} {NO_BETTER}.")
@@ -156,6 +177,11 @@ def _notes(board: Board, wide: bool) -> tuple[str, ...]:
                 {name for reads in board.lines["reads"] for name in instruments_of(reads)}
             )
             notes.append("Reads: " + ", ".join(f"{initial(name)} {name}" for name in used) + ".")
+    if (board.lines["below_bound"] != "").any():
+        notes.append(
+            f"{BELOW} below what the sensors allow: has seen what it may not, or the car's own "
+            "values."
+        )
     if board.lines["baseline"].any():
         notes.append(f"{GUESS} baseline: a guess or a formula on paper.")
     if board.lines["idealised"].any():
@@ -171,6 +197,9 @@ def _notes(board: Board, wide: bool) -> tuple[str, ...]:
 
 NOT_BETTER = "–"
 """Follows the name of a method whose skill is not positive."""
+
+BELOW = "⚠"
+"""Follows the name of a method whose error is smaller than its sensors allow."""
 
 GUESS = "○"
 """Follows the name of a baseline."""
@@ -261,6 +290,8 @@ def _row(line: Mapping[Any, Any], target: str, timings: Timings, format_: str) -
         "rmses_short": _range(factor * line["rms_from"], factor * line["rms_to"], format_),
         "percent_guess": _percent(line["beats_guess"]),
         "percent_next": _percent(line["beats_next"]),
+        "bound": _times(line["bound"], factor),
+        "known_percent": _times(line["known"], 100.0),
         "ranks": _range(line["rank_from"], line["rank_to"], "d"),
         "scores": _range(line["score_from"], line["score_to"], ".3f"),
         "rms": _times(line["rms"], factor),
@@ -295,6 +326,7 @@ def _metric_cells(line: Mapping[Any, Any], target: str) -> dict[str, Any]:
 def _name(line: Mapping[Any, Any]) -> str:
     """Return a method's label with the marks that stand below the table."""
     marks = (GUESS if line["baseline"] else "") + (NOT_BETTER if line["verdict"] else "")
+    marks += BELOW if line["below_bound"] else ""
     name = marked(line["label"], *(line[column] for column in MARKED_BY))
     return f"{name} {marks}" if marks else name
 

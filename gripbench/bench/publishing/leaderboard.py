@@ -17,6 +17,7 @@ import pandas as pd
 from pydantic import Field
 
 import gripbench
+from gripbench.bench.bounds.stored import Stored
 from gripbench.bench.catalogue.suites import load_suite, suite_files
 from gripbench.bench.publishing.answer_table import answer_table
 from gripbench.bench.publishing.board_tables import Timings, board_table
@@ -120,6 +121,7 @@ def build(
     timings: Timings | None = None,
     confidence: float = CONFIDENCE,
     targets: Iterable[str] = (),
+    bounds: Stored | None = None,
 ) -> tuple[Leaderboard, list[Board]]:
     """Return the leaderboard of these rows, and its boards.
 
@@ -137,6 +139,8 @@ def build(
         Confidence of ranks and intervals.
     targets
         Signals to rank by; empty: all.
+    bounds
+        Least errors that the sensors allow; None: not known.
 
     Raises
     ------
@@ -147,10 +151,10 @@ def build(
     rows = rows[rows["target"].isin(chosen)]
     damage = degradation(rows)
     rows = without_faults(rows)
-    found = boards(rows, confidence=confidence)
+    found = boards(rows, confidence=confidence, bounds=bounds)
     for target in dict.fromkeys(board.target for board in found):
         if len({board.sensors for board in found if board.target == target}) > 1:
-            found += boards(rows, target, ANY, confidence=confidence)
+            found += boards(rows, target, ANY, confidence=confidence, bounds=bounds)
     found += uncertainty_boards(rows, confidence)
     found.sort(
         key=lambda board: (

@@ -1,7 +1,8 @@
 """Rows and boards in; in words and as a table, which method to take, how good it is, how sure out.
 
 The answer of a board is its best method that a vehicle could run: no baseline, none that
-reads a channel which no sensor gives, and none that was computed outside and not checked.
+reads a channel which no sensor gives, none below what the sensors allow, and none that was
+computed outside and not checked.
 """
 
 from __future__ import annotations
@@ -75,6 +76,7 @@ def best_line(board: Board) -> Any | None:
     """Return the line of the method that a board recommends, None where it has none."""
     lines = board.lines
     checked = ~lines["baseline"].astype(bool) & ~lines["computed_outside"]
+    checked &= lines["below_bound"] == ""
     real = lines[checked & (lines["idealised"] == "")]
     real = real[real["score"].notna()]
     return None if real.empty else real.iloc[0]
@@ -122,7 +124,7 @@ def words(board: Board) -> str:
         guess = board.lines[board.lines["label"] == board.guess].iloc[0]
         return (
             f"{with_} no method is better than the guess {board.guess}: {_error(board, guess)}. "
-            f"The best of them is {line['label']}: {error}."
+            f"The best of them is {line['label']}: {error}." + _distance(board, line)
         )
     order = list(board.lines["label"])
     place = order.index(line["label"])
@@ -133,7 +135,7 @@ def words(board: Board) -> str:
         parts.append(
             f"better than the guess {board.guess} in {100 * line['beats_guess']:.0f} % of them"
         )
-    text = ", ".join(parts) + "."
+    text = ", ".join(parts) + "." + _distance(board, line)
     if line["worse_than_guess"]:
         text += f" Worse than that guess in {line['worse_than_guess']}."
     rivals = board.lines[(board.lines["rank_from"] == 1) & board.lines["score"].notna()]
@@ -143,6 +145,22 @@ def words(board: Board) -> str:
     others = [name for name in useless["label"] if name != line["label"]]
     if others:
         text += f" No better than a guess: {', '.join(others)}."
+    return text
+
+
+def _distance(board: Board, line: Any) -> str:
+    """Return in words how far the best method is from the least error, and who is below it."""
+    text = ""
+    if pd.notna(line["bound"]) and pd.notna(line["bound_ratio"]):
+        shown = signal(board.target)
+        unit = "" if shown.display_unit == "-" else f" {shown.display_unit}"
+        text = (
+            f" The least that these sensors allow is {shown.display_factor * line['bound']:.2g}"
+            f"{unit}: it is {line['bound_ratio']:.3g} times the bound."
+        )
+    below = list(board.lines.loc[board.lines["below_bound"] != "", "label"])
+    if below:
+        text += f" Below what the sensors allow: {', '.join(below)}."
     return text
 
 

@@ -19,7 +19,9 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
+from gripbench.bench.bounds.stored import Stored
 from gripbench.bench.ranking import statistics
+from gripbench.bench.ranking.against_bound import against_bound
 from gripbench.bench.ranking.degradation import without_faults
 from gripbench.bench.ranking.grids import (
     ANY,
@@ -46,7 +48,7 @@ _BEFORE = (
     "over_prefixes",
     "score", "score_from", "score_to", "elsewhere_from", "elsewhere_to", "skill", "verdict",
     "beats_guess", "beats_next", "worse_than_guess", "uncertainty", "nees_low", "nees_high",
-    "rms", "rms_from", "rms_to",
+    "rms", "rms_from", "rms_to", "bound", "bound_ratio", "known", "bound_runs", "below_bound",
 )  # fmt: skip
 _SCORES = ("score", "score_from", "score_to", "elsewhere_from", "elsewhere_to")
 _BEHIND = (
@@ -139,6 +141,7 @@ def rank(
     resamples: int = statistics.RESAMPLES,
     seed: int = 0,
     by: str = "rms",
+    bounds: Stored | None = None,
 ) -> pd.DataFrame:
     """Rank methods from their rows.
 
@@ -161,6 +164,8 @@ def rank(
         Bootstrap resamples and their seed.
     by
         What to rank by: `rms`, the errors; `crps`, what the methods state of their errors.
+    bounds
+        Least errors that the sensors allow, see `gripbench.bench.bounds.stored`; None: not known.
 
     Returns
     -------
@@ -182,6 +187,7 @@ def rank(
         resamples=resamples,
         seed=seed,
         by=by,
+        bounds=bounds,
     )
     return pd.concat([board.lines for board in found], ignore_index=True)
 
@@ -198,6 +204,7 @@ def boards(
     resamples: int = statistics.RESAMPLES,
     seed: int = 0,
     by: str = "rms",
+    bounds: Stored | None = None,
 ) -> list[Board]:
     """Return the boards behind `rank`, with their comparisons; parameters and errors as there."""
     if not 0.5 <= confidence < 1.0:
@@ -221,7 +228,7 @@ def boards(
             parts = on_board(rows, name, allowed)
             for lines, notes in parts:
                 grid = grid_of(lines, name, notes, measure)
-                found.append(_board(grid, allowed, len(parts) > 1, settings))
+                found.append(_board(grid, allowed, len(parts) > 1, settings, bounds or {}))
     if not found:
         raise InputError("nothing to rank: every run was skipped")
     return found
@@ -237,7 +244,11 @@ def _only(rows: pd.DataFrame, column: str, chosen: Iterable[str]) -> pd.DataFram
 
 
 def _board(
-    grid: Grid, allowed: tuple[str, ...] | None, one_of_several: bool, settings: Settings
+    grid: Grid,
+    allowed: tuple[str, ...] | None,
+    one_of_several: bool,
+    settings: Settings,
+    bounds: Stored,
 ) -> Board:
     target = grid.target
     scenarios = tuple(sorted((*grid.scenarios, *grid.single)))
@@ -269,7 +280,8 @@ def _board(
         index=["scenario", "seed"], columns="label", values=value, dropna=False
     ).reindex(columns=order)
     wins = statistics.wins(matrix.to_numpy(float))
-    lines = against_guess(lines, matrix, wins, grid)[list(columns())]
+    lines = against_guess(lines, matrix, wins, grid)
+    lines = against_bound(lines, grid, allowed, bounds, settings.confidence)[list(columns())]
     complete = [label for label in order if label in grid.labels]
     return Board(
         target=target,

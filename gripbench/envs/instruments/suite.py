@@ -93,8 +93,8 @@ class SensorSuite:
             spec["turn"] = -1
             if sensor.lever_x or sensor.lever_y:
                 spec["turn"] = _column(truth_names, "yaw_rate", channel, "lever_x")
-                levers = _levers(source, sensor, channel)
-                spec["spin_lever"], spec["turn_lever"], spec["square_lever"] = levers
+                arms = levers(source, sensor, channel)
+                spec["spin_lever"], spec["turn_lever"], spec["square_lever"] = arms
             spec["tooth"] = 2.0 * np.pi / sensor.pulses if sensor.pulses else 0.0
             spec["delay"] = round(sensor.delay / sample_time) if sample_time else 0
             spec["output"] = names.index(channel)
@@ -155,7 +155,7 @@ def _column(names: tuple[str, ...], wanted: str, channel: str, key: str) -> int:
     return names.index(wanted)
 
 
-def _levers(source: str, sensor: Sensor, channel: str) -> tuple[float, float, float]:
+def levers(source: str, sensor: Sensor, channel: str) -> tuple[float, float, float]:
     """Return what a lever arm puts before yaw acceleration, yaw rate and its square."""
     x, y = sensor.lever_x, sensor.lever_y
     known = {

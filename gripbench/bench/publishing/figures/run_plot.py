@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from gripbench.bench.bounds.bound import Bound
 from gripbench.bench.catalogue.declarations import Declaration
+from gripbench.bench.publishing.figures.knowable import shade_unknowable
 from gripbench.bench.publishing.figures.runs import Runs
 from gripbench.bench.publishing.figures.style import (
     TRUTH,
@@ -62,6 +64,7 @@ def run_plot(
     seed: int = 0,
     start: float | None = None,
     end: float | None = None,
+    bound: Bound | None = None,
 ) -> Figure:
     """Draw a signal of one run: truth and estimates above, errors below.
 
@@ -78,6 +81,8 @@ def run_plot(
     start, end
         Part of the run [s]; all of it where none is given. Of a recording it is the window, and
         times are those of the log's own clock.
+    bound
+        Of this run and signal: what could not be known is shaded.
 
     Raises
     ------
@@ -128,6 +133,10 @@ def run_plot(
             )  # fmt: skip
     rows[0].set_ylabel(axis_label(name))
     rows[-1].set_xlabel("Time [s]" if window is None else "Time of the log [s]")
+    if bound is not None:
+        for axes in rows:
+            shade_unknowable(axes, bound)
+        rows[-1].set_xlim(time[shown[0]], time[shown[-1]])
     if methods:
         zero_line(rows[1])
         rows[1].set_ylabel("Error" if unit == "-" else f"Error [{unit}]")

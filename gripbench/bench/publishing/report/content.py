@@ -14,12 +14,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from gripbench.bench.bounds.stored import Stored
 from gripbench.bench.catalogue.suites import load_suite, suite_files
 from gripbench.bench.papers.claims import paper_files
 from gripbench.bench.publishing.board_tables import board_table
 from gripbench.bench.publishing.columns import Column, Table
 from gripbench.bench.publishing.figures.style import axis_scale
 from gripbench.bench.publishing.presentation import significant
+from gripbench.bench.ranking.against_bound import least_by_scenario
 from gripbench.bench.ranking.answers import words
 from gripbench.bench.ranking.grids import opening
 from gripbench.bench.ranking.marks import MARKED_BY, marked
@@ -112,7 +114,9 @@ def rows_of_suites(rows: pd.DataFrame, suites: Sequence[str]) -> pd.DataFrame:
     return rows[keep]
 
 
-def found_boards(rows: pd.DataFrame, targets: Sequence[str]) -> list[Board]:
+def found_boards(
+    rows: pd.DataFrame, targets: Sequence[str], bounds: Stored | None = None
+) -> list[Board]:
     """Return for each target the board of all methods and one for each set of instruments.
 
     Boards of level 1 stand first and open with a production car's sensors; those
@@ -122,8 +126,8 @@ def found_boards(rows: pd.DataFrame, targets: Sequence[str]) -> list[Board]:
     for target in targets:
         if (rows.loc[rows["target"] == target, "status"] == "skipped").all():
             continue
-        found += boards(rows, target, "any")
-        found += boards(rows, target)
+        found += boards(rows, target, "any", bounds=bounds)
+        found += boards(rows, target, bounds=bounds)
     found.sort(key=lambda board: (standing_of(board), opening(board.sensors) > 0))
     return found
 
@@ -144,8 +148,10 @@ def boards_by_road(rows: pd.DataFrame, targets: Sequence[str]) -> list[tuple[str
     ]
 
 
-def heat_map(rows: pd.DataFrame, target: str) -> dict[str, Any]:
+def heat_map(rows: pd.DataFrame, target: str, bounds: Stored | None = None) -> dict[str, Any]:
     """Return the RMS of every method in every scenario, and its ratio to the scenario's best.
+
+    On top stands the least that all sensors together allow, where that is known.
 
     The best is sought among the methods that read no idealised channel and were run here.
     """
@@ -174,13 +180,25 @@ def heat_map(rows: pd.DataFrame, target: str) -> dict[str, Any]:
             else:
                 ratio[-1].append(None)
             text[-1].append(shown)
+    least = least_by_scenario(bounds or {}, target, rows)
+    top = [LEAST] if least else []
+    if least:
+        known = [least.get(name, math.nan) for name in scenarios]
+        pairs = zip(scenarios, known, strict=True)
+        ratio.insert(0, [_ratio(one, best.get(name, math.nan)) if one > 0.0 else None
+                         for name, one in pairs])  # fmt: skip
+        text.insert(0, ["–" if math.isnan(one) else significant(factor * one) for one in known])
     return {
         "scenarios": scenarios,
         "roads": [road_of(name) for name in scenarios],
-        "methods": [marked(label, *marks[label]) for label in labels],
+        "methods": [*top, *(marked(label, *marks[label]) for label in labels)],
         "ratio": ratio,
         "text": text,
     }
+
+
+LEAST = "bound (all sensors)"
+"""Row of a heat map with the least error that all sensors together allow."""
 
 
 def _words(status: str) -> str:

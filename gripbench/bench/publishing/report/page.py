@@ -11,6 +11,7 @@ from typing import Any
 import pandas as pd
 
 import gripbench
+from gripbench.bench.bounds.stored import bounds_beside
 from gripbench.bench.catalogue.registry import choose_method
 from gripbench.bench.publishing.answer_table import answer_table
 from gripbench.bench.publishing.degradation_table import degradation_tables, every_line
@@ -163,7 +164,8 @@ def page(
     absent = not_run(rows)
     if len(absent) < rows["scenario"].nunique():
         rows = rows[~rows["scenario"].isin(absent)]
-    found = found_boards(rows, targets)
+    bounds = bounds_beside(results, rows["scenario"].unique())
+    found = found_boards(rows, targets, bounds)
     whole: dict[str, Board] = {}  # the headline board of each target
     for board in found:
         if not board.sensors:
@@ -171,7 +173,7 @@ def page(
     data = {
         "targets": {name: target_words(name) for name in targets},
         "methods": list(dict.fromkeys(rows["label"])),
-        "maps": {name: heat_map(rows, name) for name in targets},
+        "maps": {name: heat_map(rows, name, bounds) for name in targets},
         "fronts": {target: points for target, board in whole.items() if (points := front(board))},
         "profiles": {target: profile(board) for target, board in whole.items()},
         "series": series,

@@ -1,0 +1,1 @@
+"""What anybody could reach with the car on paper: posterior Cramer-Rao bounds."""
