@@ -256,21 +256,21 @@ def test_it_is_the_spread_of_the_posterior_on_a_grid(one_unknown):
     noise = np.random.default_rng(5)
     at = np.array([20, 60, 120, 200, 300, 400])
     least, spreads = [], []
-    for seed in range(14):
+    for seed in range(20):
         drawn = draw(one_unknown, seed)
         run = LongitudinalSimulation(drawn.scenario, drawn.road).run(seed)[::10]
         true = np.stack([run[name] for name in ("wheel_speed_front", "wheel_speed_rear",
                                                 "speed_x")])  # fmt: skip
         channels = channels_of(one_unknown)
         least.append(bounds(one_unknown, seed, [channels], ["mu_front"])[0].deviation[at] ** 2)
-        for _ in range(20):
+        for _ in range(10):
             read = true + noise.normal(size=true.shape) / np.sqrt(weight[0])
             misfit = np.cumsum((weight * (read - seen) ** 2).sum(axis=1), axis=1)[:, at]
             likely = np.exp(-0.5 * (misfit - misfit.min(axis=0)))
             likely /= likely.sum(axis=0)
             mean = likely.T @ friction
             spreads.append(likely.T @ friction**2 - mean**2)
-    assert np.mean(least, axis=0) == pytest.approx(np.mean(spreads, axis=0), rel=0.06)
+    assert np.mean(least, axis=0) == pytest.approx(np.mean(spreads, axis=0), rel=0.1)
     assert np.mean(least, axis=0)[-1] < 0.3 * np.mean(least, axis=0)[0]  # and it learns
 
 

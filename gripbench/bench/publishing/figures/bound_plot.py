@@ -60,10 +60,13 @@ def bound_plot(bounds: list[Bound], names: list[str]) -> Figure:
     rows[2].set_yscale("symlog", linthresh=_threshold(bounds, scale))
     rows[2].set_ylabel("Information a second" + ("" if unit == "-" else f"\n[1/{unit}²]"))
     rows[2].set_xlabel("Time [s]")
-    for axes in rows:
-        shade_unknowable(axes, first)
+    lowest = min(float(np.median(bound.deviation)) for bound in bounds)
+    rows[1].set_ylim(bottom=max(0.03 * scale * lowest, 1e-12))
+    shade_unknowable(rows[0], first)
+    for axes in rows[1:]:
+        shade_unknowable(axes, first, "")
     legend_above(rows[0])
-    legend_above(rows[1], 2)
+    legend_above(rows[1], 1)
     figure.suptitle(f"{first.scenario}, seed {first.seed}", fontsize=9.5, x=0.01, ha="left")
     return figure
 

@@ -10,9 +10,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-def shade_unknowable(axes: Axes, bound: Bound) -> None:
+def shade_unknowable(axes: Axes, bound: Bound, label: str = "Not to be known") -> None:
     """Shade the times at which nobody could know the target, see `Bound.knowable`."""
     axes.fill_between(
         bound.time, 0.0, 1.0, where=~bound.knowable, transform=axes.get_xaxis_transform(),
-        color="#999999", alpha=0.25, linewidth=0.0, zorder=1, label="Not to be known",
+        color="#999999", alpha=0.25, linewidth=0.0, zorder=1, label=label,
     )  # fmt: skip
