@@ -9,7 +9,8 @@ from gripbench.bench.bounds import stored
 from gripbench.bench.bounds.bound import bounds, channels_of
 from gripbench.bench.bounds.stored import Least, read_bounds, store_bounds
 from gripbench.bench.command_line import application
-from gripbench.bench.publishing.board_tables import BELOW, board_table
+from gripbench.bench.publishing.board_tables import board_table
+from gripbench.bench.publishing.bound_columns import BELOW
 from gripbench.bench.publishing.tables import plain
 from gripbench.bench.ranking.answers import words
 from gripbench.bench.ranking.grids import instruments

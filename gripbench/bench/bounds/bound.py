@@ -135,7 +135,7 @@ def bounds(
     Raises
     ------
     InputError
-        If there is no bound for the scenario or a target is unknown.
+        If there is no bound for the scenario or the run, or a target is unknown.
     """
     for target in targets:
         check_target(scenario, target)
@@ -149,6 +149,11 @@ def bounds(
     found = []
     for channels in sets:
         variance, gained = _least(model, channels, targets)
+        if not np.isfinite(variance).all():
+            raise InputError(
+                f"{scenario.name}: seed {seed}: no bound: the recursion does not hold, a wheel "
+                "beyond the peak of its tyre's force runs away within a sample"
+            )
         for t, target in enumerate(targets):
             found.append(
                 Bound(

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -153,9 +152,8 @@ def _store(
     for text in sets:
         content.setdefault(text, {})
     for place, bound in enumerate(found):
-        value = bound.rms**2
-        if math.isfinite(value):
-            content[sets[place // len(targets)]][bound.target] = [value, bound.knowable_share]
+        pair = [bound.rms**2, bound.knowable_share]
+        content[sets[place // len(targets)]][bound.target] = pair
     body = json.dumps({"key": key, "bounds": content}, indent=1, sort_keys=True)
     write_atomically(path, body + "\n")
     return ""

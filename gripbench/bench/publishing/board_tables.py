@@ -10,6 +10,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from gripbench.bench.publishing.bound_columns import (
+    BELOW,
+    bound_columns,
+    bound_notes,
+    ratio_column,
+)
 from gripbench.bench.publishing.columns import Column, Table
 from gripbench.bench.publishing.consistency_table import uncertainty_columns, uncertainty_note
 from gripbench.bench.publishing.initials import initial, instruments_of
@@ -77,11 +83,7 @@ def _narrow(board: Board) -> tuple[Column, ...]:
             if board.guess
             else ()
         ),
-        *(
-            (Column("bound_ratio", "x bound", format=".3g"),)
-            if board.lines["bound_ratio"].notna().any()
-            else ()
-        ),
+        *ratio_column(board),
         # on the board of all methods what each reads takes its place
         *((Column("percent_next", "> next"),) if board.sensors or not board.guess else ()),
     ]
@@ -110,16 +112,7 @@ def _wide(board: Board, relative: bool) -> tuple[Column, ...]:
         Column("rmses", f"RMS ({percent})", unit),
         Column("uncertainty", "What it says of its error"),
         Column("nees_band", f"NEES of a consistent one ({percent})"),
-        *(
-            (
-                Column("bound", "Bound", unit, ".4g"),
-                Column("bound_ratio", "RMS / bound", format=".3g"),
-                Column("known_percent", "Can be known", "% of drives", ".0f"),
-                Column("below_bound", "Below what the sensors allow in"),
-            )
-            if board.lines["bound"].notna().any()
-            else ()
-        ),
+        *bound_columns(board, unit),
         Column("skill", "Skill", format=".3f"),
         Column("beats_guess", "Better than a guess in", "% of drives", ".0f"),
         Column("beats_next", "Better than the next in", "% of drives", ".0f"),
@@ -157,12 +150,6 @@ def _notes(board: Board, wide: bool) -> tuple[str, ...]:
                 f"Skill: 1 - score / score of the best guess ({board.guess}); > guess, > next: "
                 "share of drives with less error than that guess, than the line below."
             )
-        if board.lines["bound_ratio"].notna().any():
-            runs = int(board.lines["bound_runs"].iloc[0])
-            notes.append(
-                "x bound: RMS over the least that any estimate with these sensors can have, in "
-                f"{runs} of the runs (docs/bounds.md)."
-            )
         useless = board.lines.loc[board.lines["verdict"] != "", "label"]
         if len(useless):
             notes.append(f"{NOT_BETTER} {NO_BETTER}.")
@@ -177,11 +164,7 @@ def _notes(board: Board, wide: bool) -> tuple[str, ...]:
                 {name for reads in board.lines["reads"] for name in instruments_of(reads)}
             )
             notes.append("Reads: " + ", ".join(f"{initial(name)} {name}" for name in used) + ".")
-    if (board.lines["below_bound"] != "").any():
-        notes.append(
-            f"{BELOW} below what the sensors allow: has seen what it may not, or the car's own "
-            "values."
-        )
+    notes += bound_notes(board, wide)
     if board.lines["baseline"].any():
         notes.append(f"{GUESS} baseline: a guess or a formula on paper.")
     if board.lines["idealised"].any():
@@ -197,9 +180,6 @@ def _notes(board: Board, wide: bool) -> tuple[str, ...]:
 
 NOT_BETTER = "–"
 """Follows the name of a method whose skill is not positive."""
-
-BELOW = "⚠"
-"""Follows the name of a method whose error is smaller than its sensors allow."""
 
 GUESS = "○"
 """Follows the name of a baseline."""
