@@ -10,12 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from gripbench.bench.publishing.bound_columns import (
-    BELOW,
-    bound_columns,
-    bound_notes,
-    ratio_column,
-)
+from gripbench.bench.publishing import bound_columns as of_bound
 from gripbench.bench.publishing.columns import Column, Table
 from gripbench.bench.publishing.consistency_table import uncertainty_columns, uncertainty_note
 from gripbench.bench.publishing.initials import initial, instruments_of
@@ -83,7 +78,7 @@ def _narrow(board: Board) -> tuple[Column, ...]:
             if board.guess
             else ()
         ),
-        *ratio_column(board),
+        *of_bound.ratio_column(board),
         # on the board of all methods what each reads takes its place
         *((Column("percent_next", "> next"),) if board.sensors or not board.guess else ()),
     ]
@@ -112,7 +107,7 @@ def _wide(board: Board, relative: bool) -> tuple[Column, ...]:
         Column("rmses", f"RMS ({percent})", unit),
         Column("uncertainty", "What it says of its error"),
         Column("nees_band", f"NEES of a consistent one ({percent})"),
-        *bound_columns(board, unit),
+        *of_bound.bound_columns(board, unit),
         Column("skill", "Skill", format=".3f"),
         Column("beats_guess", "Better than a guess in", "% of drives", ".0f"),
         Column("beats_next", "Better than the next in", "% of drives", ".0f"),
@@ -164,7 +159,7 @@ def _notes(board: Board, wide: bool) -> tuple[str, ...]:
                 {name for reads in board.lines["reads"] for name in instruments_of(reads)}
             )
             notes.append("Reads: " + ", ".join(f"{initial(name)} {name}" for name in used) + ".")
-    notes += bound_notes(board, wide)
+    notes += of_bound.bound_notes(board, wide)
     if board.lines["baseline"].any():
         notes.append(f"{GUESS} baseline: a guess or a formula on paper.")
     if board.lines["idealised"].any():
@@ -270,8 +265,7 @@ def _row(line: Mapping[Any, Any], target: str, timings: Timings, format_: str) -
         "rmses_short": _range(factor * line["rms_from"], factor * line["rms_to"], format_),
         "percent_guess": _percent(line["beats_guess"]),
         "percent_next": _percent(line["beats_next"]),
-        "bound": _times(line["bound"], factor),
-        "known_percent": _times(line["known"], 100.0),
+        **of_bound.bound_cells(line, factor),
         "ranks": _range(line["rank_from"], line["rank_to"], "d"),
         "scores": _range(line["score_from"], line["score_to"], ".3f"),
         "rms": _times(line["rms"], factor),
@@ -306,7 +300,7 @@ def _metric_cells(line: Mapping[Any, Any], target: str) -> dict[str, Any]:
 def _name(line: Mapping[Any, Any]) -> str:
     """Return a method's label with the marks that stand below the table."""
     marks = (GUESS if line["baseline"] else "") + (NOT_BETTER if line["verdict"] else "")
-    marks += BELOW if line["below_bound"] else ""
+    marks += of_bound.below_mark(line)
     name = marked(line["label"], *(line[column] for column in MARKED_BY))
     return f"{name} {marks}" if marks else name
 

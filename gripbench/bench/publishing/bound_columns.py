@@ -2,11 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from gripbench.bench.publishing.columns import Column
 from gripbench.bench.ranking.ranking import Board
 
 BELOW = "⚠"
 """Follows the name of a method whose error is smaller than its sensors allow."""
+
+
+def below_mark(line: Mapping[Any, Any]) -> str:
+    """Return the mark of a method that is below what its sensors allow; empty: it is not."""
+    return BELOW if line["below_bound"] else ""
+
+
+def bound_cells(line: Mapping[Any, Any], factor: float) -> dict[str, float]:
+    """Return the cells of `bound_columns`; `factor` is that of the target's display unit."""
+    return {"bound": factor * line["bound"], "known_percent": 100.0 * line["known"]}
 
 
 def ratio_column(board: Board) -> tuple[Column, ...]:
