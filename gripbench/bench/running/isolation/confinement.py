@@ -16,7 +16,11 @@ from collections.abc import Collection
 
 import psutil
 
-from gripbench.bench.running.isolation.landlock import enter_domain, refuse_kept_memory
+from gripbench.bench.running.isolation.landlock import (
+    drop_powers,
+    enter_domain,
+    refuse_kept_memory,
+)
 
 _SET_DEATH_SIGNAL, _SET_SUBREAPER = 1, 36
 
@@ -33,6 +37,7 @@ def confine(memory: int, closed: tuple[str, tuple[str, ...]] | None) -> None:
     """
     _limit_memory(memory)
     with contextlib.suppress(OSError, AttributeError):
+        drop_powers()
         enter_domain(closed)
         refuse_kept_memory()
 
