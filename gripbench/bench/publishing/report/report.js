@@ -184,7 +184,7 @@
     const z = map.ratio.map((row) => row.map((value) =>
       value === null ? null : Math.log10(Math.min(Math.max(value, 1), top))));
     byId("map-plot").style.height = `${Math.max(16, 9 + 2.2 * map.methods.length)}rem`;
-    byId("map-plot").style.minWidth = `${20 + 4.2 * map.scenarios.length}rem`;
+    byId("map-plot").style.minWidth = `${27 + 4.2 * map.scenarios.length}rem`;
     const names = map.scenarios.map((name) => name.replaceAll("_", " "));
     const words = { x: [], y: [], text: [], color: [] };
     map.text.forEach((row, i) => row.forEach((text, j) => {
@@ -196,7 +196,7 @@
       customdata: map.ratio, colorscale: "Cividis", zmin: 0, zmax: Math.log10(top), xgap: 2, ygap: 2,
       hovertemplate: "%{y}<br>%{x}<br>RMS %{text}<br>%{customdata:.3g} times the best<extra></extra>",
       hoverongaps: false,
-      colorbar: { title: { text: "times the best" }, tickvals: [0, Math.log10(2), Math.log10(5), 1, Math.log10(top)],
+      colorbar: { title: { text: "× best" }, tickvals: [0, Math.log10(2), Math.log10(5), 1, Math.log10(top)],
         ticktext: ["1", "2", "5", "10", "30+"], outlinewidth: 0 },
     }, {
       type: "scatter", mode: "text", x: words.x, y: words.y, text: words.text,
