@@ -12,7 +12,7 @@ from gripbench.bench.catalogue.registry import built_in_methods
 from gripbench.bench.publishing import leaderboard, method_pages
 
 ROOT = Path(__file__).parents[2]
-QUICK = ("docs/add-a-vehicle.md", "docs/contract.md", "docs/extend.md")
+QUICK = ("docs/add-a-vehicle.md", "docs/contract.md", "docs/extend.md", "docs/trained.md")
 SLOW = (
     "README.md",
     "docs/index.md",

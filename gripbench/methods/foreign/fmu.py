@@ -190,7 +190,7 @@ class Fmu(ForeignMethod):
 
 
 def place_of_units() -> Path:
-    """Return the folder of this user, among the temporary files, in which FMUs are unpacked."""
+    """Return the folder, among this process's temporary files, in which FMUs are unpacked."""
     user = str(os.getuid()) if hasattr(os, "getuid") else "user"
     return Path(tempfile.gettempdir(), f"gripbench_fmu_{user}")
 
