@@ -18,6 +18,7 @@ Graph. Statist. 13, 2004.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from statistics import NormalDist
@@ -113,7 +114,7 @@ def mean_log_rms(
     fixed = np.empty((0, methods)) if fixed_rms is None else fixed_rms
     if scenarios + len(fixed) == 0:
         raise InputError("statistics: no scenario to compare in")
-    of_mean = np.sqrt if rooted else np.asarray
+    of_mean: Callable[[Floats], Floats] = np.sqrt if rooted else np.asarray
     pooled = of_mean(sums_of_squares.sum(axis=1) / counts.sum(axis=1))
     floor = _SMALLEST_SHARE * np.concatenate([pooled, fixed]).max(axis=1, initial=0.0)
     floor = np.maximum(floor, max(smallest, np.finfo(float).tiny))[:, None]

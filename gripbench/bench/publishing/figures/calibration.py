@@ -105,7 +105,8 @@ def nees_plot(runs: Runs, scenario: str, methods: Sequence[str], name: str, seed
     figure = new_figure(3.6)
     axes = figure.subplots()
     for index, (label, every) in enumerate(_over_runs(runs, scenario, methods, name, seeds)):
-        squares, times = [], np.empty(0)
+        squares: list[Floats] = []
+        times: Floats = np.empty(0)
         for time, stated in every:
             normalised = stated.normalised()
             if normalised is None:
