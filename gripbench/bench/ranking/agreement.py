@@ -19,7 +19,6 @@ from gripbench.bench.ranking import statistics
 from gripbench.bench.ranking.degradation import without_faults
 from gripbench.bench.ranking.grids import Grid, grid_of, on_board
 from gripbench.bench.ranking.plans import level_of, plan_of
-from gripbench.bench.ranking.resolution import resolution
 from gripbench.bench.running.recorded_scenarios import PREFIX
 from gripbench.errors import InputError
 
@@ -156,12 +155,12 @@ def _grid(rows: pd.DataFrame, target: str) -> Grid:
 def _scores(grid: Grid, labels: list[str], seed: int, resamples: int) -> statistics.Scores:
     places = [grid.labels.index(label) for label in labels]
     return statistics.mean_log_rms(
-        grid.sums_of_squares[:, :, places],
+        grid.totals[:, :, places],
         grid.counts[:, :, places],
-        grid.single_rms[:, places],
+        grid.single_values[:, places],
         resamples,
         seed,
-        resolution(grid.target),
+        grid.measure.floor(grid.target),
     )
 
 
