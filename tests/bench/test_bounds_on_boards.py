@@ -80,6 +80,14 @@ def test_without_bounds_nothing_is_claimed():
     assert "x bound" not in plain(board_table(board))
 
 
+def test_bounds_of_public_seeds_say_nothing_of_hidden_ones():
+    rows = [row(label, seed, rms, scenario="step", salt="0" * 32)
+            for label, rms in (("a", 1e-9), ("b", 0.2)) for seed in range(4)]  # fmt: skip
+    board = boards(frame_of(rows), bounds=allowed(4), resamples=20)[0]
+    assert board.lines["bound"].isna().all()
+    assert (board.lines["below_bound"] == "").all()
+
+
 def test_a_method_at_the_bound_is_seldom_accused():
     """The worst case: its error is one draw that stays for all of the run."""
     draws = np.random.default_rng(7)

@@ -1,7 +1,8 @@
 """Stored bounds: computed once for what boards need, kept beside the rows, read for ranking.
 
 `<results>/bounds/<scenario>/<seed>.json`, written whole or not at all. Each has the key of what it
-was made from (scenario, population, plant, instruments and the code of the bound); a file with
+was made from (scenario, population, plant, instruments, the secret of hidden seeds and the code of
+the bound); a file with
 another key, or a damaged one, counts as none and is computed again.
 """
 
@@ -17,7 +18,7 @@ from urllib.parse import quote
 from gripbench.bench.bounds.bound import bounds, channels_of
 from gripbench.bench.bounds.model import reason_for_none
 from gripbench.bench.catalogue.scenarios import find_scenario
-from gripbench.bench.running.fingerprints import scenario_digest, versions
+from gripbench.bench.running.fingerprints import salt_of, scenario_digest, versions
 from gripbench.envs.scenarios import Scenario
 from gripbench.envs.signals import signal
 from gripbench.envs.worlds import known_worlds, sensors_of
@@ -55,7 +56,8 @@ Stored = Mapping[tuple[str, int, str, str], Least]
 def key_of(scenario: Scenario) -> str:
     """Return the digest of all that a stored bound of a scenario is made from."""
     code = source_digest(Path(__file__).parent / "bound.py")
-    return digest(scenario_digest(scenario), code, json.dumps(versions()), repr(STEP))
+    parts = (json.dumps(versions()), repr(STEP), salt_of(scenario))
+    return digest(scenario_digest(scenario), code, *parts)
 
 
 def instruments_of(text: str, scenario: Scenario) -> tuple[str, ...]:

@@ -15,7 +15,8 @@ import numpy as np
 import pandas as pd
 
 from gripbench.bench.bounds.stored import EVERYTHING, Stored
-from gripbench.bench.ranking.grids import Grid, sensor_sets
+from gripbench.bench.ranking.grids import Grid, salts_of, sensor_sets
+from gripbench.envs.hidden_draws import salt_digest
 
 COLUMNS = ("bound", "bound_ratio", "known", "below_bound", "bound_runs")
 
@@ -50,6 +51,7 @@ def against_bound(
     (their number) and `below_bound` (scenarios in which a method is below what the sensors allow,
     `all together` where it is so over all of them; empty: nowhere).
     """
+    stored = {} if _drawn_otherwise(grid.rows) else stored
     text = EVERYTHING if sensors is None else ", ".join(sensors)
     cells = grid.rows[["scenario", "seed"]].drop_duplicates()
     least = {
@@ -79,6 +81,11 @@ def against_bound(
             lines.loc[place, "bound_ratio"] = float(np.exp(np.mean(np.log(ratios))))
         lines.loc[place, "below_bound"] = _below(own, confidence)
     return lines
+
+
+def _drawn_otherwise(rows: pd.DataFrame) -> bool:
+    """Return whether rows come from other draws than bounds do: of another secret, or of none."""
+    return any(salt != salt_digest() for salt in salts_of(rows))
 
 
 def _pooled(rows: pd.DataFrame) -> float:
@@ -117,6 +124,7 @@ def _below(own: pd.DataFrame, confidence: float) -> str:
 
 def least_by_scenario(stored: Stored, target: str, rows: pd.DataFrame) -> dict[str, float]:
     """Return the least RMS that all sensors together allow, pooled over the stored seeds."""
+    stored = {} if _drawn_otherwise(rows) else stored
     squares: dict[str, list[float]] = {}
     present = set(rows["scenario"])
     for (name, _, text, of), least in stored.items():
