@@ -46,6 +46,10 @@ class Plugin:
         return given_state(self.source.make(self.variant, self.parameters), self.state)
 
 
+_kept: list[Any] = []
+"""What was made to see what it declares: its own `__del__` may never end."""
+
+
 def load_plugin(request: dict[str, Any], state: bytes) -> Plugin:
     """Load and compile what a message of `loading.loading_message` names."""
     seed_generators(request["seed"])
@@ -58,6 +62,7 @@ def load_plugin(request: dict[str, Any], state: bytes) -> Plugin:
     source = Source(request["kind"], request["target"], payload)
     variant, parameters = request["variant"], request["parameters"]
     method = source.make(variant, parameters)
+    _kept.append(method)
     declaration, online = declaration_of(method, variant, parameters), takes_samples(method)
     _forget_compiled(declaration)
     _compile(method)
