@@ -54,21 +54,26 @@ def load_place(place: str) -> ImportedLog:
         return _published(place, data_folder())
     path = Path(place)
     if place.endswith(".toml"):
-        from gripbench.logs.mapping.beside import log_beside
-
-        log = log_beside(path)
-        files = [path, *(sorted(log.iterdir()) if log.is_dir() else [log])]
-        return _mapped(place, log, tuple(file.stat().st_mtime_ns for file in files))
+        return _mapped(place, _files_beside(path))
     about = path / "recording.json"
     return _stored(place, about.stat().st_mtime_ns if about.is_file() else 0)
 
 
-@lru_cache(maxsize=4)
-def _mapped(place: str, log: Path, changed: tuple[int, ...]) -> ImportedLog:
-    from gripbench.logs.importing import import_log
+def _files_beside(path: Path) -> tuple[tuple[str, int, int], ...]:
+    """Return what tells the files beside a map, its log and vehicle among them, from others."""
+    if not path.parent.is_dir():
+        return ()
+    entries = ((entry.name, entry.stat()) for entry in path.parent.iterdir() if entry.is_file())
+    return tuple(sorted((name, about.st_mtime_ns, about.st_size) for name, about in entries))
 
-    del changed  # part of the cache's key only: the log or its map may be another one
-    return import_log(log, Path(place))
+
+@lru_cache(maxsize=4)
+def _mapped(place: str, beside: tuple[tuple[str, int, int], ...]) -> ImportedLog:
+    from gripbench.logs.importing import import_log
+    from gripbench.logs.mapping.beside import log_beside
+
+    del beside  # part of the cache's key only: the log or its map may be another one
+    return import_log(log_beside(Path(place)), Path(place))
 
 
 @lru_cache(maxsize=4)
