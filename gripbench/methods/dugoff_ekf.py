@@ -25,9 +25,6 @@ gives it; here it is the channel of an optical speed sensor.
 
 Of its variance: the friction is assumed. On snow and ice the forces are wrong for as long as the
 road is, and Q, white, stands for errors that pass from sample to sample.
-The variant `lasting_errors` gives every noise 2.5 times the variance, as an error has that lasts
-longer than a sample: the same estimates, and a variance that is consistent over the suite of level
-1.
 """
 
 from __future__ import annotations
@@ -45,7 +42,6 @@ from gripbench.methods.blocks.kalman import (
     predict_covariance,
 )
 from gripbench.methods.contract import CompiledMethod, Parameter, compiled
-from gripbench.methods.settings import scaled
 
 DUGOFF_STATE = np.dtype(
     [
@@ -78,14 +74,6 @@ DUGOFF_PARAMETERS = (
     Parameter("correction", True, "-", "Measurements correct the model; else it runs open loop"),
     Parameter("load_transfer_track", 1.0, "-", "Share of the track in eq. 6", 0.1, 2.0),
 )
-
-
-_LASTING_ERRORS = scaled(
-    DUGOFF_PARAMETERS,
-    dict.fromkeys(("speed_x_walk", "speed_y_walk", "yaw_rate_walk"), 2.5)
-    | dict.fromkeys(("speed_x_noise", "yaw_rate_noise", "speed_y_std"), sqrt(2.5)),
-)
-"""Every noise with 2.5 times the variance."""
 
 
 @compiled
@@ -316,7 +304,7 @@ class DugoffEkf(CompiledMethod):
         "cornering_stiffness_rear",
     )
     parameters = DUGOFF_PARAMETERS
-    variants = {"open_loop": {"correction": False}, "lasting_errors": _LASTING_ERRORS}
+    variants = {"open_loop": {"correction": False}}
     printed = "gripbench.methods.printed.dakhlallah2008"
     state = DUGOFF_STATE
     step = staticmethod(_step)

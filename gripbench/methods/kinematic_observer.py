@@ -9,9 +9,7 @@ International Journal of Vehicle Autonomous Systems 2, whose switch on the devia
 is made smooth: the variance of the pseudo-measurement grows with the square of the deviation.
 
 Of its variance: the model's sideslip is wrong by the bank, the stiffness and the offset for a
-whole bend, and is taken as a measurement with white noise, sample by sample. The variant
-`lasting_errors` takes both noises for errors that last longer, 1.6 to 1.7 times as large, and is
-consistent over the suite of level 1.
+whole bend, and is taken as a measurement with white noise, sample by sample.
 """
 
 from __future__ import annotations
@@ -75,10 +73,7 @@ class KinematicObserver(SingleTrackFilter):
     title = "Kinematic observer, switched"
     reference = "Farrelly & Wellstead (1996); Ungoren, Peng & Tseng (2004)"
     vehicle_parameters = _FUSED_VEHICLE
-    variants = {
-        **speed_sources(_VEHICLE),
-        "lasting_errors": {"accel_y_noise": 0.17, "pseudo_noise": 0.008},
-    }
+    variants = speed_sources(_VEHICLE)
     parameters = (
         *FUSED_PARAMETERS,
         Parameter("pseudo_noise", 0.005, "rad sqrt(s)", "Density of the model's error", 1e-5, 1.0),

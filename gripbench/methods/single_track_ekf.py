@@ -8,23 +8,16 @@ Dynamics, 3.2.
 
 Of its variance: friction and stiffness are taken for known. Where the road is another one the
 error of the tyre forces lasts for the whole slide; the noise that stands for it is white.
-The variant `lasting_errors` counts what it is wrong by as lasting: an error of density sigma
-sqrt(T) that stays for T_c has the density sigma sqrt(2 T_c), four times as much for T_c = 8 T, 80
-ms at 100 Hz. Estimates are the same, the variance is consistent over the suite of level 1: too
-modest where the road is the one that is assumed, too sure on ice and snow.
 """
 
 from __future__ import annotations
 
-from gripbench.methods.blocks.single_track import SINGLE_TRACK_VEHICLE
 from gripbench.methods.blocks.single_track_ekf import correct_track, predict_track
 from gripbench.methods.blocks.single_track_filter import (
     FUSED_PARAMETERS,
     LATERAL_INNOVATIONS,
-    NOISE_PARAMETERS,
     SingleTrackFilter,
     read_inputs,
-    speed_sources,
     start_lateral,
     track_state,
     write_innovations,
@@ -32,7 +25,6 @@ from gripbench.methods.blocks.single_track_filter import (
     write_no_innovations,
 )
 from gripbench.methods.contract import Parameter, compiled
-from gripbench.methods.settings import scaled
 
 
 @compiled
@@ -66,11 +58,5 @@ class SingleTrackEkf(SingleTrackFilter):
         *FUSED_PARAMETERS,
         Parameter("friction", 0.8, "-", "Friction coefficient that is assumed", 0.05, 1.5),
     )
-    variants = {
-        **speed_sources(SINGLE_TRACK_VEHICLE),
-        "lasting_errors": scaled(
-            NOISE_PARAMETERS, dict.fromkeys((noise.name for noise in NOISE_PARAMETERS), 4.0)
-        ),
-    }
     state = track_state(2)
     step = staticmethod(_step)

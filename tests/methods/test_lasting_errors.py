@@ -7,7 +7,7 @@ from gripbench.bench.catalogue.registry import choose_method
 from gripbench.envs.signals import record_type
 from gripbench.envs.vehicles import load_vehicle
 
-FACTORS = {"dugoff_ekf": 2.5, "extended_kalman_filter": 2.5, "single_track_ekf": 16.0}
+FACTORS = {"extended_kalman_filter": 2.5}
 
 
 def samples(channels, number=300):

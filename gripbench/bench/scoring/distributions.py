@@ -77,7 +77,9 @@ class Normal:
 
     def inside(self, level: float) -> Floats | None:
         """Return where the interval holds the truth."""
-        return (np.abs(self.error) <= _normal_quantile(0.5 + level / 2.0) * self.deviation) * 1.0
+        return np.asarray(
+            (np.abs(self.error) <= _normal_quantile(0.5 + level / 2.0) * self.deviation) * 1.0
+        )
 
     def width(self, level: float) -> Floats | None:
         """Return the width of the interval."""
@@ -89,7 +91,7 @@ class Normal:
 
     def below(self, level: float) -> Floats | None:
         """Return where the truth is not above the quantile."""
-        return (-self.error <= _normal_quantile(level) * self.deviation) * 1.0
+        return np.asarray((-self.error <= _normal_quantile(level) * self.deviation) * 1.0)
 
 
 @dataclass(frozen=True)
@@ -130,7 +132,7 @@ class Quantiles:
         low, high = self._at(0.5 - level / 2.0), self._at(0.5 + level / 2.0)
         if low is None or high is None:
             return None
-        return ((low <= self.truth) & (self.truth <= high)) * 1.0
+        return np.asarray(((low <= self.truth) & (self.truth <= high)) * 1.0)
 
     def width(self, level: float) -> Floats | None:
         """Return it where both ends are quantiles that were stated."""
@@ -157,7 +159,7 @@ class Quantiles:
     def below(self, level: float) -> Floats | None:
         """Return where the truth is not above the quantile."""
         at = self._at(level)
-        return None if at is None else (self.truth <= at) * 1.0
+        return None if at is None else np.asarray((self.truth <= at) * 1.0)
 
     def _at(self, level: float) -> Floats | None:
         for k, stated in enumerate(self.levels):
