@@ -24,6 +24,7 @@ from gripbench.envs.instruments.sensors import Sensor
 from gripbench.envs.plants.longitudinal.world import LongitudinalSimulation
 from gripbench.envs.plants.planar.world import PlanarSimulation
 from gripbench.envs.populations.draws import draw
+from gripbench.envs.populations.drives import friction_of
 from gripbench.envs.populations.population import load_population, population_path
 from gripbench.envs.vehicles import load_vehicle, require
 from gripbench.envs.worlds import at_level, load_scenario
@@ -197,7 +198,7 @@ mean = 0.8
 std = 0.1
 source = "test"
 [road]
-friction = { std = 0.12, source = "test" }
+friction = { std = 0.4, source = "test" }
 [effects]
 radius_per_pressure = { value = 0.0, source = "test" }
 stiffness_per_wear = { value = 0.0, source = "test" }
@@ -239,6 +240,7 @@ def one_unknown(tmp_path):
     return at_level(scenario, 1)
 
 
+@pytest.mark.slow
 def test_it_is_the_spread_of_the_posterior_on_a_grid(one_unknown):
     """Nonlinear plant, one unknown: every friction of a fine grid is simulated, none linearised."""
     spread = load_population(one_unknown.population).spreads["road.friction"]
@@ -270,7 +272,7 @@ def test_it_is_the_spread_of_the_posterior_on_a_grid(one_unknown):
             likely /= likely.sum(axis=0)
             mean = likely.T @ friction
             spreads.append(likely.T @ friction**2 - mean**2)
-    assert np.mean(least, axis=0) == pytest.approx(np.mean(spreads, axis=0), rel=0.1)
+    assert np.mean(least, axis=0) == pytest.approx(np.mean(spreads, axis=0), rel=0.15)
     assert np.mean(least, axis=0)[-1] < 0.3 * np.mean(least, axis=0)[0]  # and it learns
 
 
@@ -336,7 +338,7 @@ def test_those_of_the_planar_plant_too_with_the_inputs_held(tmp_path):
         for side in (0.01, -0.01):
             car, road = drawn.road, drawn.scenario.road
             if cause == "road.friction":
-                road = road.model_copy(update={"mu": road.mu * np.exp(side * spread)})
+                road = road.model_copy(update={"mu": friction_of(road.mu, side * spread)})
             else:
                 moved = {cause: drawn.deviations[cause] + side * spread}
                 car = draw(scenario, 0, changes=moved).road

@@ -24,6 +24,7 @@ from gripbench.envs.plants.longitudinal.trajectory import LongitudinalTrajectory
 from gripbench.envs.plants.planar.trajectory import PlanarTrajectory
 from gripbench.envs.plants.trajectory import ROAD, Floats, Shift, Trajectory
 from gripbench.envs.populations.cars import car_on_road
+from gripbench.envs.populations.causes import PROCESSES
 from gripbench.envs.populations.draws import Draw, draw
 from gripbench.envs.populations.population import Population, load_population
 from gripbench.envs.scenarios import Scenario
@@ -37,7 +38,7 @@ SHARE = 1e-5
 """Half width of central differences over the size of what is moved."""
 
 _DRIVEN = 1.0  # window over which the driver's steps are averaged [s]
-_PROCESSES = ("friction", "grade", "bank")
+_PROCESSES = ("friction_along", "grade", "bank")
 _TRAJECTORIES: dict[str, type[Any]] = {
     "longitudinal": LongitudinalTrajectory,
     "planar": PlanarTrajectory,
@@ -183,7 +184,8 @@ def _spreads(population: Population | None, level: int) -> dict[str, float]:
     return {
         name: level * spread.moments[1]
         for name, spread in population.spreads.items()
-        if name.startswith(("car.", "tyre.")) or name.removeprefix("road.") in ROAD
+        if name.startswith(("car.", "tyre."))
+        or (name.removeprefix("road.") in ROAD and name not in PROCESSES)
     }
 
 

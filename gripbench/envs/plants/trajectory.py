@@ -13,9 +13,10 @@ from gripbench.envs.vehicles import CarOnRoad
 
 Floats = npt.NDArray[np.float64]
 
-ROAD = ("friction", "friction_right", "grade", "bank",
+ROAD = ("friction_along", "friction", "friction_right", "grade", "bank",
         *(f"friction_step_{number}" for number in range(1, 5)))  # fmt: skip
-"""What of a road may be moved: a friction by its logarithm, an inclination [rad]."""
+"""What of a road may be moved: its friction by the logarithm, the same by the deviation of a cause
+(of log-odds), an inclination [rad]."""
 
 
 @dataclass(frozen=True)

@@ -68,6 +68,12 @@ def friction_of(nominal: float, deviation: float) -> float:
     return low * (high / low) ** (odds / (1.0 + odds))
 
 
+def friction_slope(friction: float) -> float:
+    """Return the slope of a friction's logarithm to the deviation that `friction_of` takes."""
+    low, high = _limits(friction)
+    return math.log(friction / low) * math.log(high / friction) / math.log(high / low)
+
+
 def _log_odds(friction: float) -> float:
     low, high = _limits(friction)
     return math.log(math.log(friction / low) / math.log(high / friction))

@@ -17,6 +17,7 @@ from gripbench.envs.plants.longitudinal.sampling import TRUTH_TYPE, write_truth
 from gripbench.envs.plants.longitudinal.scenario import LongitudinalScenario
 from gripbench.envs.plants.longitudinal.world import LongitudinalSimulation
 from gripbench.envs.plants.trajectory import Floats, Shift, Trajectory, moved
+from gripbench.envs.populations.drives import friction_slope
 from gripbench.envs.vehicles import CarOnRoad
 
 _RATES = ("speed_x_rate", "wheel_acceleration_front", "wheel_acceleration_rear")
@@ -64,9 +65,11 @@ class LongitudinalTrajectory(Trajectory):
         relative = scenario.wheel_speed_noise * np.sqrt(scenario.sample_time / 1e-3)
         self.jumps = relative * np.abs(self.state)
         self.jumps[:, 0] = 0.0
-        starts = sorted(piece.start for piece in scenario.friction)
+        pieces = sorted(scenario.friction, key=lambda piece: piece.start)
+        starts = [piece.start for piece in pieces]
         held = self.time - 0.5 * scenario.sample_time  # a sample has the friction of what led to it
         self._piece = np.maximum(np.searchsorted(starts, held, side="right") - 1, 0)
+        self._steepness = np.array([friction_slope(one.first) for one in pieces])[self._piece]
 
     def evaluate(self, shift: Shift) -> Floats:
         """Return rates and truth, see `Trajectory`."""
@@ -82,9 +85,14 @@ class LongitudinalTrajectory(Trajectory):
             name, size = shift.road
             if name == "grade":
                 inputs["road_grade"] += size
+            elif name == "friction_along":
+                inputs["mu_front"] *= np.exp(size)
+                inputs["mu_rear"] *= np.exp(size)
             elif name == "friction" or name.startswith("friction_step_"):
                 number = int(name.rpartition("_")[2]) if name != "friction" else -1
-                factor = np.where((number < 0) | (self._piece == number), np.exp(size), 1.0)
+                factor = np.where(
+                    (number < 0) | (self._piece == number), np.exp(size * self._steepness), 1.0
+                )
                 inputs["mu_front"] *= factor
                 inputs["mu_rear"] *= factor
         found = np.zeros(len(truth), TRUTH_TYPE)

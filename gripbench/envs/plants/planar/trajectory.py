@@ -16,6 +16,7 @@ from gripbench.envs.plants.planar.run import HEADING, NORTH, UP, Run, act, begin
 from gripbench.envs.plants.planar.truth import TRUTH, write_truth
 from gripbench.envs.plants.planar.world import WHEELS, PlanarScenario, PlanarSimulation
 from gripbench.envs.plants.trajectory import Floats, Shift, Trajectory, moved
+from gripbench.envs.populations.drives import friction_slope
 from gripbench.envs.roads.road import Ground, Road, feel_road, lay_road
 from gripbench.envs.vehicles import CarOnRoad
 
@@ -135,25 +136,32 @@ class PlanarTrajectory(Trajectory):
 
     def _ground(self, name: str, size: float) -> Ground:
         """Return the road with one thing of it moved."""
-        road, factor = self._scenario.road, float(np.exp(size))
+        road = self._scenario.road
+
+        def moved_by(value: float) -> float:
+            if value <= 0.0:
+                return value
+            steep = 1.0 if name == "friction_along" else friction_slope(value)
+            return value * float(np.exp(size * steep))
+
         changes: dict[str, Any] = {}
         if name in ("grade", "bank"):
             changes[name] = getattr(road, name) + size
-        elif name == "friction":
-            changes = {key: getattr(road, key) * factor for key in ("mu", "mu_right", "mu_after")}
+        elif name in ("friction", "friction_along"):
+            changes = {key: moved_by(getattr(road, key)) for key in ("mu", "mu_right", "mu_after")}
             changes["surfaces"] = tuple(
-                one.model_copy(update={"mu": one.mu * factor}) for one in road.surfaces
+                one.model_copy(update={"mu": moved_by(one.mu)}) for one in road.surfaces
             )
         elif name == "friction_right":
-            changes["mu_right"] = road.mu_right * factor
+            changes["mu_right"] = moved_by(road.mu_right)
         else:
             number = int(name.rpartition("_")[2])
             changes["surfaces"] = tuple(
-                one.model_copy(update={"mu": one.mu * (factor if place == number else 1.0)})
+                one.model_copy(update={"mu": moved_by(one.mu) if place == number else one.mu})
                 for place, one in enumerate(road.surfaces, 1)
             )
             if number == 1:
-                changes["mu_after"] = road.mu_after * factor
+                changes["mu_after"] = moved_by(road.mu_after)
         return _laid(road.model_copy(update=changes), self._run.path, self._scenario, self._seed)
 
 
