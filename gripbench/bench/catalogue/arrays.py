@@ -64,9 +64,10 @@ def numbers_of_fit(given: Any) -> Arrays:
 
 def packed(arrays: Arrays) -> bytes:
     """Return arrays as bytes, the same whenever they hold the same."""
-    head = [[name, arrays[name].dtype.str, arrays[name].shape] for name in sorted(arrays)]
+    names = sorted(arrays)
+    head = [[name, arrays[name].dtype.str, arrays[name].shape] for name in names]
     text = json.dumps(head).encode("ascii")
-    return b"".join((_LENGTH.pack(len(text)), text, *(arrays[h[0]].tobytes() for h in head)))
+    return b"".join((_LENGTH.pack(len(text)), text, *(arrays[name].tobytes() for name in names)))
 
 
 def unpacked(content: bytes) -> Arrays:

@@ -122,14 +122,14 @@ def _ranges_of(method: Any, parameters: Mapping[str, Any]) -> dict[str, Any]:
 
     They are numbers with a finite range: of a plain class those in its `ranges`.
     """
+    found: dict[str, Any] = {}
     given = getattr(method, "parameters", ())
     if isinstance(given, list | tuple) and all(isinstance(item, Parameter) for item in given):
-        settings = {**{item.name: item.default for item in given}, **parameters}
-        settings |= getattr(method, "settings", {})
+        settings = {item.name: item.default for item in given} | dict(parameters)
+        own_settings = getattr(method, "settings", {})
+        settings |= own_settings if isinstance(own_settings, Mapping) else {}
         found = {item.name: (item.low, settings[item.name], item.high) for item in given}
         found = {name: ends for name, ends in found.items() if isinstance(ends[1], float)}
-    else:
-        found = {}
     own = getattr(method, "ranges", None)
     if isinstance(own, Mapping):
         known = inspect.signature(type(method)).parameters

@@ -20,7 +20,6 @@ import numpy as np
 from pydantic import Field
 
 from gripbench.bench.catalogue.arrays import Arrays, numbers_of_fit, packed, unpacked
-from gripbench.bench.catalogue.declarations import Declaration
 from gripbench.bench.catalogue.registry import MethodSpec, method_digest
 from gripbench.bench.catalogue.training import Trained, Training
 from gripbench.bench.running.courses import EACH, Course, course_of
@@ -169,12 +168,6 @@ def _fit(
     except Exception as error:
         raise CellFailure("failed", describe_error(error)) from None
     return state, time.monotonic() - began, {}
-
-
-def drives_for(declaration: Declaration, folder: Path, each: int = EACH) -> list[TrainingDrive]:
-    """Return the training drives of a method that is fitted here and now, as `fit` gets them."""
-    course = course_of(declaration.trained_on, folder, each)
-    return [training_drive(one, declaration) for one in course.recordings(declaration)]
 
 
 def _key(spec: MethodSpec, course: Course, budget: int) -> str:

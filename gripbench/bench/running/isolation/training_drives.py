@@ -81,9 +81,8 @@ def training_drive(recording: Recording, declaration: Declaration) -> TrainingDr
 
 def received(head: dict[str, Any], receive: Callable[[int], bytes]) -> TrainingDrive:
     """Return the drive that a message announces."""
-    arrays = []
-    for names in (head["observations"], head["truth"]):
-        kind = record_type(names)
-        content = receive(head["samples"] * kind.itemsize)
-        arrays.append(np.frombuffer(content, kind))
-    return TrainingDrive(head["scenario"], head["vehicle"], *arrays, head["score_from"])
+    observations, truth = (
+        np.frombuffer(receive(head["samples"] * kind.itemsize), kind)
+        for kind in map(record_type, (head["observations"], head["truth"]))
+    )
+    return TrainingDrive(head["scenario"], head["vehicle"], observations, truth, head["score_from"])
