@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from gripbench.bench.catalogue.registry import choose_method
+from gripbench.bench.catalogue.registry import built_in_methods, choose_method
 from gripbench.bench.running.backends import Backend
 from gripbench.bench.running.forms import runnable
 from gripbench.bench.running.recorded_logs import PREFIX
@@ -25,6 +25,7 @@ from gripbench.errors import InputError
 from gripbench.logs.importing import ImportedLog, import_log
 from gripbench.logs.storing import store
 from gripbench.logs.vehicle.identification import LOOSE, Identified, identify_tyres, with_velocity
+from gripbench.methods.contract import CompiledMethod
 
 _ON_PAPER = {
     "stiffness_front": "cornering_stiffness_front",
@@ -121,6 +122,9 @@ def study(
     kept = store(imported, folder / "recording")
     runs = imported.recordings
     choices, left_out = runnable(runs[0], (target,))
+    for choice in [one for one in choices if not _quick(one)]:
+        del choices[choice]
+        left_out[choice] = "an optimiser solves its steps, too slow to tune: gripbench run runs it"
     to_tune = [
         choice
         for choice, spec in choices.items()
@@ -150,6 +154,11 @@ def study(
     plan = Plan((scenario,), tuple(specs), range(scenario.runs))
     run_plan(plan, Store(folder / "results"), Backend("loky", workers), on_row=rows.append)
     return Study(imported, found, tuple(tuned), tuple(rows), left_out, tuple(words), folder, target)
+
+
+def _quick(choice: str) -> bool:
+    """Return whether a method is compiled, so that sixty passes over a log take seconds."""
+    return issubclass(built_in_methods()[choice.partition(":")[0]], CompiledMethod)
 
 
 def _each_tuned(
