@@ -54,7 +54,7 @@ def bound_plot(bounds: list[Bound], names: list[str]) -> Figure:
         seconds, information = information_a_second(bound)
         line(rows[2], seconds, information / scale**2, name, look, offset)
     rows[1].set_yscale("log")
-    rows[1].axhline(scale * first.prior, color="#000000", linewidth=0.8, label="without sensors")
+    rows[1].axhline(scale * first.prior, color=TRUTH.color, linewidth=0.8, label="without sensors")
     label = "Least deviation"
     rows[1].set_ylabel(label if unit == "-" else f"{label} [{unit}]")
     rows[2].set_yscale("symlog", linthresh=_threshold(bounds, scale))
