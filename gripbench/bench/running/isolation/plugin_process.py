@@ -14,7 +14,6 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import gc
-import io
 import os
 import shutil
 import socket
@@ -85,9 +84,8 @@ def _print_to(descriptor: int) -> None:
     """Have all that this process prints go to a descriptor, at once: it may end any time."""
     for output in {1, 2} - {descriptor}:
         os.dup2(descriptor, output)
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(line_buffering=True, errors="backslashreplace")
+    options: dict[str, Any] = {"buffering": 1, "errors": "backslashreplace", "closefd": False}
+    sys.stdout, sys.stderr = (open(output, "w", **options) for output in (1, 2))
 
 
 def _refuse(*_: Any, **__: Any) -> NoReturn:
