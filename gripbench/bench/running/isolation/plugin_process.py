@@ -85,7 +85,7 @@ def _print_to(descriptor: int) -> None:
     for output in {1, 2} - {descriptor}:
         os.dup2(descriptor, output)
     options: dict[str, Any] = {"buffering": 1, "errors": "backslashreplace", "closefd": False}
-    sys.stdout, sys.stderr = (open(output, "w", **options) for output in (1, 2))
+    sys.stdout, sys.stderr = (os.fdopen(output, "w", **options) for output in (1, 2))
 
 
 def _refuse(*_: Any, **__: Any) -> NoReturn:
