@@ -25,7 +25,7 @@ from gripbench.errors import InputError
 from gripbench.logs.importing import ImportedLog, import_log
 from gripbench.logs.storing import store
 from gripbench.logs.vehicle.identification import LOOSE, Identified, identify_tyres, with_velocity
-from gripbench.methods.contract import CompiledMethod
+from gripbench.methods.blocks.solved import SolvedMethod
 
 _ON_PAPER = {
     "stiffness_front": "cornering_stiffness_front",
@@ -157,8 +157,8 @@ def study(
 
 
 def _quick(choice: str) -> bool:
-    """Return whether a method is compiled, so that sixty passes over a log take seconds."""
-    return issubclass(built_in_methods()[choice.partition(":")[0]], CompiledMethod)
+    """Return whether a method's steps are compiled: sixty passes over a log then take seconds."""
+    return not issubclass(built_in_methods()[choice.partition(":")[0]], SolvedMethod)
 
 
 def _each_tuned(
