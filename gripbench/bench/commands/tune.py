@@ -73,7 +73,8 @@ def tune(
         )
     else:
         use_data_folder(data)
-        tuned = tune_recording(*words, target, budget)
+        recording, method = words
+        tuned = tune_recording(recording, method, target, budget)
         spans = ", ".join(f"{start:.3f} to {end:.3f} s" for start, end in tuned.windows)
         where = f"the training windows {spans}"
     print(

@@ -18,7 +18,7 @@ from gripbench.bench.running.fingerprints import scenario_digest
 from gripbench.bench.running.isolation import training_drives
 from gripbench.bench.running.recorded_scenarios import RecordedScenario
 from gripbench.bench.scoring.scoring import targets_of
-from gripbench.envs.plants.longitudinal.world import PAPER_SOLVER
+from gripbench.envs.plants.longitudinal.scenario import PAPER_SOLVER
 from gripbench.envs.populations.population import population_files
 from gripbench.envs.recordings import Recording
 from gripbench.envs.scenarios import Scenario
