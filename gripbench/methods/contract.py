@@ -124,7 +124,7 @@ class CompiledMethod:
     quantiles: ClassVar[Mapping[str, tuple[float, ...]]] = {}
     innovations: ClassVar[tuple[str, ...]] = ()
     vehicle_parameters: tuple[str, ...] = ()
-    unread: ClassVar[Callable[[Mapping[str, Setting]], Collection[str]] | None] = None
+    unread: ClassVar[Callable[..., Collection[str]] | None] = None
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     variants: ClassVar[Mapping[str, Any]] = {}
     printed: ClassVar[str] = ""

@@ -132,7 +132,9 @@ class Graph:
         before, after = self._kept[0], self._kept[-1]
         span = after[0] - before[0]
         share = min(max((time - before[0]) / span, 0.0), 1.0) if span > 0.0 else 0.0
-        speed, mean, variances = ((1.0 - share) * before[i] + share * after[i] for i in (1, 2, 3))
+        speed = (1.0 - share) * before[1] + share * after[1]
+        mean = (1.0 - share) * before[2] + share * after[2]
+        variances = (1.0 - share) * before[3] + share * after[3]
         square = speed * speed + mean[0] ** 2
         spread = min(variances[4], 1.0)
         mu = exp(min(mean[4] + 0.5 * spread, 0.5))

@@ -118,7 +118,7 @@ def solver(function: Any) -> Any:
     z = ca.SX.sym("z", _SIZE)
     data = ca.SX.sym("data", 30 + len(WINDOW) * HORIZON)
     vector, _ = function(z, data)
-    problem = {"x": z, "p": data, "f": 0.5 * ca.sumsqr(vector)}
+    problem: dict[str, Any] = {"x": z, "p": data, "f": 0.5 * ca.sumsqr(vector)}
     options = {
         "print_time": False,
         "calc_lam_p": False,
@@ -204,14 +204,15 @@ class Horizon:
         found, slopes = self._function(z, self._data)
         columns = [0, 1, 2, 3, _SIZE - 3, _SIZE - 2, _SIZE - 1]
         rows = np.asarray(slopes)[:9][:, columns]  # arrival, motion, yaw rate and a_y of a window
-        triangle = np.linalg.qr(np.column_stack((rows, np.asarray(found)[:9])), mode="r")
+        both = np.column_stack((rows, np.asarray(found)[:9]))
+        triangle = np.asarray(np.linalg.qr(both, mode="r"))
         root, rest = triangle[2:7, 2:7], triangle[2:7, 7]
         covariance = np.linalg.inv(root.T @ root)
         span = self._windows[0, 0]
         covariance[[2, 3], [2, 3]] += params["stiffness_walk"] ** 2 * span
         covariance[4, 4] += params["friction_walk"] ** 2 * span
         mean = z[columns[2:]] - np.linalg.solve(root, rest)
-        self._arrive(np.linalg.cholesky(np.linalg.inv(covariance)).T, mean)
+        self._arrive(np.asarray(np.linalg.cholesky(np.linalg.inv(covariance)).T), mean)
 
 
 class MovingHorizonEstimator(SingleTrackFilter, SolvedMethod):

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from gripbench.bench.commands import RANK
-from gripbench.bench.running.store import DEFAULT_RESULTS
+from gripbench.writing import DEFAULT_RESULTS
 
 
 def register(app: typer.Typer) -> None:

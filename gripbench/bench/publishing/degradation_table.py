@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 import pandas as pd
 
@@ -95,7 +98,7 @@ def _worst(lines: pd.DataFrame, column: str) -> dict[str, str]:
     risen = lines[lines["ratio"] > 1.005]
     if risen.empty:
         return {"worst": ""}
-    line = risen.loc[risen["ratio"].idxmax()]
+    line = risen.iloc[int(risen["ratio"].argmax())]
     return {"worst": f"{line[column]} {line['ratio']:{_RATIO}}"}
 
 
@@ -109,5 +112,5 @@ def _ends(lines: pd.DataFrame) -> dict[str, float]:
     }
 
 
-def _size(row: dict[str, float]) -> float:
-    return row["ratio"] if row["ratio"] == row["ratio"] else np.inf
+def _size(row: Mapping[str, Any]) -> float:
+    return float(row["ratio"]) if row["ratio"] == row["ratio"] else np.inf

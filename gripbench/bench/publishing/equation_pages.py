@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -83,7 +83,7 @@ def equations_page() -> str:
     return "\n".join(parts)
 
 
-def equation_lines() -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+def equation_lines() -> tuple[tuple[str, ...], Sequence[tuple[str, ...]]]:
     """Return header and lines of the index: paper, equation, function and file."""
     # a module's summary is named where no function of it holds the equation
     held = {(place.paper, place.equation, place.path) for place in places() if place.name}

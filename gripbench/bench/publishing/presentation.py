@@ -124,7 +124,7 @@ def _down(
     part: pd.DataFrame,
     factor: float,
     caption: str,
-    more: Callable[[pd.Series, float], Mapping[str, str]] = lambda line, factor: {},
+    more: Callable[[pd.Series, float], dict[str, str]] = lambda line, factor: {},
 ) -> Table:
     """Return a table with a block for each scenario; what was skipped altogether is left out."""
     rows = [
@@ -137,7 +137,7 @@ def _down(
     return _blocks(rows, caption)
 
 
-def _blocks(rows: Sequence[Mapping[str, str]], caption: str) -> Table:
+def _blocks(rows: Sequence[Mapping[str, Any]], caption: str) -> Table:
     titles = {"method": "scenario, method"}
     columns = tuple(
         Column(key, titles.get(key, key), right=key not in ("scenario", "method"))

@@ -100,7 +100,7 @@ def worst_table(frame: pd.DataFrame, labels: Sequence[str], target: str) -> Tabl
         table = summary_of(frame, label).set_index("cause")
         if table["nominal"].isna().all():
             continue
-        order = shares.loc[label].sort_values(kind="stable")
+        order = pd.Series(shares.loc[label]).sort_values(kind="stable")
         cells = []
         if not (order > 0.0).any():
             cells = ["behind the best baseline without any error"]
@@ -129,10 +129,10 @@ def radius_table(frame: pd.DataFrame, labels: Sequence[str], target: str) -> Tab
         part = frame[own & (frame["cause"] == PAPER + "wheel_radius")]
         if part.empty or part["rms"].isna().all():
             continue
-        line = summary_of(frame[own | frame["baseline"]], label).set_index("cause")
-        line = line.loc[PAPER + "wheel_radius"]
+        found = summary_of(frame[own | frame["baseline"]], label).set_index("cause")
+        line = pd.Series(found.loc[PAPER + "wheel_radius"])
         rms = {
-            name: factor * float(part.loc[(part["deviation"] - size).abs() < 1e-9, "rms"].iloc[0])
+            name: factor * float(part["rms"][(part["deviation"] - size).abs() < 1e-9].iloc[0])
             for name, size in (("less", -RADIUS_CASE), ("right", 0.0), ("more", RADIUS_CASE))
         }
         rows.append(

@@ -272,7 +272,7 @@ def _compared(
     smallest = max(resolution(target), float(np.finfo(float).tiny))
     logs = [np.log(np.maximum(np.sqrt(each[0] / each[1]), smallest)) for each in sums]
     failed = sum(row.status not in ("ok", "skipped") for row in fresh)
-    difference, half = difference_of(*logs, confidence)
+    difference, half = difference_of(logs[0], logs[1], confidence)
     where = f"{target} in {scenario}"
     fault = ""
     if failed and not _as_often(len(packed) - len(logs[0]), len(packed), failed, len(fresh)):
@@ -286,9 +286,10 @@ def _compared(
             f"{where}: RMS {pooled[1]:.4g} on fresh seeds, {pooled[0]:.4g} in the pack; ratio "
             f"{math.exp(difference):.3g}, within {ends[0]:.3g} to {ends[1]:.3g}"
         )
+    ratio, low, high = (math.exp(difference + shift) for shift in (0.0, -half, half))
     return Comparison(
         scenario, target, pooled[0], len(logs[0]), pooled[1], len(logs[1]), failed,
-        *(math.exp(difference + shift) for shift in (0.0, -half, half)), fault,
+        ratio, low, high, fault,
     )  # fmt: skip
 
 
@@ -323,7 +324,7 @@ def _as_often(failed_before: int, before: int, failed: int, runs: int) -> bool:
 
     if failed == runs and failed_before < before:
         return False
-    table = [[failed, runs - failed], [failed_before, before - failed_before]]
+    table = np.array([[failed, runs - failed], [failed_before, before - failed_before]])
     return bool(fisher_exact(table, alternative="greater").pvalue > 1.0 - CONFIDENCE)
 
 

@@ -83,11 +83,11 @@ class Normal:
 
     def width(self, level: float) -> Floats | None:
         """Return the width of the interval."""
-        return 2.0 * _normal_quantile(0.5 + level / 2.0) * self.deviation
+        return np.asarray(2.0 * _normal_quantile(0.5 + level / 2.0) * self.deviation)
 
     def normalised(self) -> Floats | None:
         """Return the error over the stated deviation."""
-        return self.error / self.deviation
+        return np.asarray(self.error / self.deviation)
 
     def below(self, level: float) -> Floats | None:
         """Return where the truth is not above the quantile."""
@@ -137,7 +137,7 @@ class Quantiles:
     def width(self, level: float) -> Floats | None:
         """Return it where both ends are quantiles that were stated."""
         low, high = self._at(0.5 - level / 2.0), self._at(0.5 + level / 2.0)
-        return None if low is None or high is None else high - low
+        return None if low is None or high is None else np.asarray(high - low)
 
     def normalised(self) -> Floats | None:
         """Return the error over the deviation of a normal of two halves.
@@ -154,7 +154,7 @@ class Quantiles:
         if not (np.all(down > 0.0) and np.all(up > 0.0)):
             return None
         error = median - self.truth
-        return error / np.where(error > 0.0, down, up)
+        return np.asarray(error / np.where(error > 0.0, down, up))
 
     def below(self, level: float) -> Floats | None:
         """Return where the truth is not above the quantile."""

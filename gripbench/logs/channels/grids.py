@@ -46,9 +46,9 @@ def _longest_stretch(series: Sequence[Series]) -> tuple[float, float]:
     gaps = []
     for one in {id(s.times): s.times for s in series}.values():
         steps = np.diff(one)
-        wide = (
-            np.flatnonzero(steps > max(1.0, _GAP * float(np.median(steps)))) if len(steps) else []
-        )
+        if not len(steps):
+            continue
+        wide = np.flatnonzero(steps > max(1.0, _GAP * float(np.median(steps))))
         gaps += [(float(one[k]), float(one[k + 1])) for k in wide]
     best, begin = (start, start), start
     for low, high in [*sorted(gaps), (end, end)]:

@@ -8,7 +8,7 @@ inputs and left out as measurements.
 from __future__ import annotations
 
 from math import atan2, exp, log
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -185,8 +185,8 @@ class SingleTrackFilter(CompiledMethod):
     """Declaration of a filter on the single-track model; a subclass adds name, state and step."""
 
     sensors = FUSED_SENSORS
-    estimates = LATERAL_ESTIMATES
-    variances = LATERAL_VARIANCES
+    estimates: ClassVar[tuple[str, ...]] = LATERAL_ESTIMATES
+    variances: ClassVar[tuple[str, ...]] = LATERAL_VARIANCES
     vehicle_parameters = FUSED_VEHICLE
-    parameters = FUSED_PARAMETERS
+    parameters: ClassVar[tuple[Parameter, ...]] = FUSED_PARAMETERS
     variants = speed_sources(SINGLE_TRACK_VEHICLE)

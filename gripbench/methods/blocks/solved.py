@@ -38,7 +38,7 @@ class SolvedMethod(CompiledMethod):
         Makes what takes the samples from the parameters, a record of shape (1,).
     """
 
-    solver: ClassVar[Callable[[npt.NDArray[Any]], Solver]]
+    solver: ClassVar[Callable[..., Solver]]
     step = None  # type: ignore[assignment]
     _running: Solver | None = None
 

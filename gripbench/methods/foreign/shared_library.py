@@ -37,8 +37,8 @@ def library_loop() -> Callable[[int, int, npt.NDArray[np.float64], npt.NDArray[n
     from numba.extending import intrinsic
 
     @intrinsic
-    def call(context, function, state, sample, estimates):  # type: ignore[no-untyped-def]
-        def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+    def call(context, function, state, sample, estimates):
+        def generate(context, builder, signature, arguments):
             pointer = ir.IntType(8).as_pointer()
             kind = ir.FunctionType(ir.IntType(32), [pointer] * 3)
             target = builder.inttoptr(arguments[0], kind.as_pointer())
@@ -48,7 +48,7 @@ def library_loop() -> Callable[[int, int, npt.NDArray[np.float64], npt.NDArray[n
         return types.int32(types.intp, types.intp, types.intp, types.intp), generate
 
     @numba.njit(nogil=True)
-    def loop(function, state, samples, estimates):  # type: ignore[no-untyped-def]
+    def loop(function, state, samples, estimates):
         sample, estimate = samples.ctypes.data, estimates.ctypes.data
         for k in range(samples.shape[0]):
             if k > 0:
@@ -61,7 +61,7 @@ def library_loop() -> Callable[[int, int, npt.NDArray[np.float64], npt.NDArray[n
                 return code
         return 0
 
-    return loop  # type: ignore[no-any-return]
+    return loop
 
 
 class SharedLibrary(ForeignMethod):
