@@ -118,8 +118,8 @@ def solver(function: Any) -> Any:
     z = ca.SX.sym("z", _SIZE)
     data = ca.SX.sym("data", 30 + len(WINDOW) * HORIZON)
     vector, _ = function(z, data)
-    problem: dict[str, Any] = {"x": z, "p": data, "f": 0.5 * ca.sumsqr(vector)}
-    options = {
+    problem = {"x": z, "p": data, "f": 0.5 * ca.sumsqr(vector)}
+    options: dict[str, Any] = {
         "print_time": False,
         "calc_lam_p": False,
         "ipopt": {"print_level": 0, "sb": "yes", "max_iter": 30, "tol": 1e-6},

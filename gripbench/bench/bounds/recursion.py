@@ -156,7 +156,7 @@ def least_variance(
     Both of shape (n, t): variance, and what the readings of a sample add to its inverse.
     """
     covariance = np.array(start, dtype=np.float64)
-    return _recursion(  # type: ignore[no-any-return]
+    return _recursion(
         covariance, motion.transition, motion.noise, motion.decay, motion.spread, motion.driven,
         readings.rows, readings.variance, readings.take, readings.read, targets,
     )  # fmt: skip

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gripbench.bench.commands import RANK
-from gripbench.bench.running.store import DEFAULT_RESULTS
+from gripbench.writing import DEFAULT_RESULTS
 
 if TYPE_CHECKING:
     from gripbench.bench.bounds.bound import Bound

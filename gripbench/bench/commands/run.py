@@ -154,8 +154,8 @@ def run(
     frame = frame_of(sorted(rows, key=order_in(plan)))
     shown = frame[frame["target"].isin([*targets, ""])] if targets else frame
     print_summary(summary(without_faults(shown)))
-    for recording, text in scored_windows(frame).items():
-        console().print(f"scored of {recording}: {text}", soft_wrap=True)
+    for log, text in scored_windows(frame).items():
+        console().print(f"scored of {log}: {text}", soft_wrap=True)
     if faults:
         damage = degradation(shown)
         for table in degradation_tables(damage):

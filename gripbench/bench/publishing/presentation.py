@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from gripbench.bench.publishing.columns import Column, Table
 from gripbench.bench.publishing.tables import show, width_of

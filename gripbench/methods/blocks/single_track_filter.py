@@ -189,4 +189,4 @@ class SingleTrackFilter(CompiledMethod):
     variances: ClassVar[tuple[str, ...]] = LATERAL_VARIANCES
     vehicle_parameters = FUSED_VEHICLE
     parameters: ClassVar[tuple[Parameter, ...]] = FUSED_PARAMETERS
-    variants = speed_sources(SINGLE_TRACK_VEHICLE)
+    variants: ClassVar[Any] = speed_sources(SINGLE_TRACK_VEHICLE)

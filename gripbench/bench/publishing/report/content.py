@@ -183,11 +183,11 @@ def heat_map(rows: pd.DataFrame, target: str, bounds: Stored | None = None) -> d
     least = least_by_scenario(bounds or {}, target, rows)
     top = [LEAST] if least else []
     if least:
-        known = [least.get(name, math.nan) for name in scenarios]
-        pairs = zip(scenarios, known, strict=True)
+        bounded = [least.get(name, math.nan) for name in scenarios]
+        pairs = zip(scenarios, bounded, strict=True)
         ratio.insert(0, [_ratio(one, best.get(name, math.nan)) if one > 0.0 else None
                          for name, one in pairs])  # fmt: skip
-        text.insert(0, ["–" if math.isnan(one) else significant(factor * one) for one in known])
+        text.insert(0, ["–" if math.isnan(one) else significant(factor * one) for one in bounded])
     return {
         "scenarios": scenarios,
         "roads": [road_of(name) for name in scenarios],

@@ -115,7 +115,7 @@ def enter_scratch(scratch: str) -> None:
         os.makedirs(scratch, exist_ok=True)
     audit.ignore(scratch)
     os.environ["TMPDIR"] = tempfile.tempdir = scratch
-    Cache.save_overload = lambda *_: None  # type: ignore[method-assign]
+    Cache.save_overload = lambda *_: None
     _CacheLocator.ensure_cache_path = lambda _: None  # what is stored is read where it lies
     part_from_parent(scratch)
 
