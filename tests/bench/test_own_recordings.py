@@ -134,6 +134,7 @@ def test_a_recording_by_folder_name_and_map_through_every_command(here):
     assert (frame["seed"].nunique()) == recorded_scenario("map.toml").runs
 
 
+@pytest.mark.slow
 def test_study_writes_a_ranked_page(here):
     text = _call("study", "map.csv", "--map", "map.toml", "--budget", 6, "--workers", 1)
     assert "test 120.000 to 139.900 s" in text

@@ -114,6 +114,7 @@ def test_a_pack_holds_what_its_rows_rest_on_and_is_the_same_bytes(packed, scenar
     assert (tmp_path / "again.zip").read_bytes() == packed.read_bytes()
 
 
+@pytest.mark.slow
 def test_an_honest_pack_is_verified_elsewhere(packed, scenario, tmp_path):
     alone = tmp_path / "elsewhere" / "mine.zip"
     alone.parent.mkdir()
@@ -131,6 +132,7 @@ def test_an_honest_pack_is_verified_elsewhere(packed, scenario, tmp_path):
     assert fresh[0].salt
 
 
+@pytest.mark.slow
 def test_who_simulates_the_packed_drives_is_not_verified(tmp_path):
     short = gripbench.load_scenario(SCENARIO).model_copy(update={"horizon": 0.2})
     method = str(KINDS / "simulates.py")
@@ -153,6 +155,7 @@ def test_who_simulates_the_packed_drives_is_not_verified(tmp_path):
     assert "on fresh seeds, 0 in the pack" in verdict.faults[0]
 
 
+@pytest.mark.slow
 def test_false_figures_under_right_digests_are_not_verified(packed, scenario, tmp_path):
     def better(content):
         from gripbench.bench.running.rows import Row
@@ -335,6 +338,7 @@ def test_what_cannot_be_packed_says_why(packed, tmp_path):
     assert not (tmp_path / "x.zip").exists()
 
 
+@pytest.mark.slow
 def test_the_commands_say_it_in_words_and_by_exit_code(packed, scenario, tmp_path):
     app, method = application(), f"{packed.parent / 'mine.py'}:Mine@share=0.4"
     done = CliRunner().invoke(
