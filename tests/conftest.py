@@ -2,6 +2,7 @@
 
 import os
 
+import pytest
 from hypothesis import settings
 
 # An example that compiles a kernel, or a busy machine, says nothing about the property. The same
@@ -15,3 +16,9 @@ settings.register_profile(
 settings.load_profile("gripbench")
 
 os.environ.pop("GRIPBENCH_SALT", None)  # what tests expect belongs to public seeds
+
+
+@pytest.fixture(autouse=True)
+def _pipe(monkeypatch):
+    """What is printed goes into a pipe, whatever width the runner of the tests sets."""
+    monkeypatch.delenv("COLUMNS", raising=False)

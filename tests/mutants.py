@@ -61,7 +61,7 @@ MUTANTS = (
         "tests/envs/test_tyres.py",
     ),
     Mutant(
-        "logs/series.py",
+        "logs/channels/series.py",
         'return wrapped(converted) if name == "course" and not target else converted',
         "return converted",
         "tests/logs",
@@ -92,8 +92,8 @@ MUTANTS = (
     ),
     Mutant(
         "methods/kinematic_kalman_filter.py",
-        "correct_scalar(filter, wrapped(obs.course - (x[0] - turned)), variance)",
-        "correct_scalar(filter, obs.course - (x[0] - turned), variance)",
+        "state.course_innovation = wrapped(obs.course - (x[0] - turned))",
+        "state.course_innovation = obs.course - (x[0] - turned)",
         "tests/methods/test_kinematic_kalman_filter.py",
     ),
     Mutant(
@@ -104,8 +104,8 @@ MUTANTS = (
     ),
     Mutant(
         "methods/model_based_kalman_filter.py",
-        "state.course_innovation_variance += 2.0 * P[0, 2]",
-        "state.course_innovation_variance += 0.0 * P[0, 2]",
+        "return P[0, 0] + P[2, 2] + variance + 2.0 * P[0, 2]",
+        "return P[0, 0] + P[2, 2] + variance",
         "tests/methods/test_model_based_kalman_filter.py",
     ),
     Mutant(
@@ -122,14 +122,14 @@ MUTANTS = (
     ),
     Mutant(
         "bench/running/fingerprints.py",
-        "return digest(scenario_digest(scenario), scoring_digest())",
-        "return digest(scenario_digest(scenario))",
+        "digest(scenario_digest(scenario), scoring_digest(), *([secret] if secret else []))",
+        "digest(scenario_digest(scenario), *([secret] if secret else []))",
         "tests/bench/test_keys.py",
     ),
     Mutant(
         "bench/running/cells.py",
-        "repr(sorted(versions().items())), method.digest, str(seed))",
-        "repr(sorted(versions().items())), str(seed))",
+        "repr(sorted(versions().items())), method.digest, str(seed), *learned)",
+        "repr(sorted(versions().items())), str(seed), *learned)",
         "tests/bench/test_keys.py",
     ),
     Mutant(
@@ -145,10 +145,10 @@ MUTANTS = (
         "tests/bench/test_scoring.py",
     ),
     Mutant(
-        "bench/scoring/metrics/calibration.py",
-        "reach = _quantile(0.5 + level / 2.0)",
-        "reach = _quantile(level)",
-        "tests/bench/test_metrics.py",
+        "bench/scoring/distributions.py",
+        "(np.abs(self.error) <= _normal_quantile(0.5 + level / 2.0) * self.deviation) * 1.0",
+        "(np.abs(self.error) <= _normal_quantile(level) * self.deviation) * 1.0",
+        "tests/bench/test_distributions.py",
     ),
 )
 

@@ -71,6 +71,7 @@ def system(seed, n, states=3, rest=2):
     return motion, whole, noise, draws
 
 
+@pytest.mark.slow
 def test_it_settles_at_the_solution_of_the_riccati_equation():
     n = 400
     motion, whole, noise, draws = system(1, n)

@@ -88,6 +88,7 @@ def test_bounds_of_public_seeds_say_nothing_of_hidden_ones():
     assert (board.lines["below_bound"] == "").all()
 
 
+@pytest.mark.slow
 def test_a_method_at_the_bound_is_seldom_accused():
     """The worst case: its error is one draw that stays for all of the run."""
     draws = np.random.default_rng(7)

@@ -153,6 +153,14 @@ class NegativeVariance(Sound):
         return {"force_x_front": 0.0, "force_x_front_variance": -obs["time"]}
 
 
+class CrossingQuantiles(Sound):
+    variances = ()
+    quantiles = {"force_x_front": (0.05, 0.95)}
+
+    def update(self, obs):
+        return {"force_x_front": 0.0, "force_x_front_q05": 1.0, "force_x_front_q95": -1.0}
+
+
 class TwoForms(Sound):
     def run(self, vehicle, observations):
         import numpy as np
@@ -192,6 +200,7 @@ FAULTS = [
     (DividesBySpeed, "survives_standstill", "guard divisions by speed"),
     (DividesByTorque, "survives_zero_torque_start", "at or after a start without torque"),
     (NegativeVariance, "variance_not_negative", "keep the covariance positive"),
+    (CrossingQuantiles, "quantiles_in_order", "force_x_front_q05 is above force_x_front_q95"),
     (TwoForms, "online_and_batch_agree", "run and update give force_x_front"),
     (NotPicklable, "picklable", "keep no lambdas"),
     (Slow, "step_within_sample_time", "a sample comes every 1 ms"),
@@ -214,7 +223,7 @@ def test_a_mistake_is_found_and_named(method, check, message):
 def test_a_sound_plain_class_passes():
     results = check_estimator(Sound, SCENARIO)
     assert failures(results) == {}
-    left = ["reads_within_bounds", "online_and_batch_agree"]
+    left = ["reads_within_bounds", "quantiles_in_order", "online_and_batch_agree"]
     assert [name for name, text in results.items() if text != PASSED] == left
 
 
@@ -261,6 +270,7 @@ def test_a_variance_is_looked_at_in_every_scenario():
     assert "in scenario large_torque" in found
 
 
+@pytest.mark.slow
 def test_a_variant_that_diverges_on_purpose_says_so():
     found = check_estimator("magnetometer_gps_cascade:single_delay", checks=NUMERICAL)
     assert found["variance_not_negative"].startswith(EXPECTED)

@@ -127,6 +127,7 @@ def test_a_fit_sees_level_one_of_seeds_that_are_never_tested_and_is_made_once(
     assert list(again["sum_of_squares"]) == list(old["sum_of_squares"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", ["code", "settings", "data", "stored file"])
 def test_a_fit_is_made_again_when_anything_is_another(brief, method, tmp_path, what):
     results = tmp_path / "results"
@@ -198,6 +199,7 @@ def test_boards_say_how_it_was_trained(brief, method, tmp_path):
     assert not board.lines.set_index("label").loc["constant_friction", "training"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("before", "reason"),
     [
@@ -379,6 +381,7 @@ class Level(CompiledMethod):
 """
 
 
+@pytest.mark.slow
 def test_what_a_compiled_method_fits_are_its_parameters(brief, tmp_path):
     path = tmp_path / "level.py"
     path.write_text(COMPILED)

@@ -11,7 +11,7 @@ import pytest
 import gripbench
 from gripbench.bench.publishing.board_tables import board_table, one_table
 from gripbench.bench.ranking.ranking import boards
-from gripbench.bench.running.isolation import confinement, processes
+from gripbench.bench.running.isolation import processes
 from gripbench.bench.running.store import Store
 from gripbench.envs.hidden_draws import VARIABLE, entropy, salt_digest
 from gripbench.envs.populations.draws import BLOCK, quantiles
@@ -82,6 +82,7 @@ def _run(results, *names, **options):
     return rows[rows["target"] == "mu_front"].set_index(["label", "seed"])
 
 
+@pytest.mark.slow
 def test_who_simulates_public_seeds_finds_no_hidden_one(secret, tmp_path):
     public = _run(tmp_path / "public", "sound", "simulates")
     assert (public.loc["simulates", "rms"] == 0.0).all()  # the hole: status ok, rank 1
@@ -166,4 +167,3 @@ def test_papers_are_reproduced_with_public_seeds_only(secret, tmp_path):
     with pytest.raises(InputError, match="li2014: its numbers are of public seeds"):
         reproduce_paper("li2014", tmp_path / "out")
     assert not (tmp_path / "out").exists()
-    assert confinement.landlock_version() >= 0

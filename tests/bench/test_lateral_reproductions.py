@@ -18,6 +18,7 @@ def within(value, low=-math.inf, high=math.inf, outside=False):
     return (low <= value <= high) != outside
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("module", [anderson2004, dakhlallah2008])
 def test_every_claim_keeps_its_verdict_and_every_figure_its_bounds(module):
     calls = []

@@ -152,6 +152,7 @@ def test_network_fmu_and_python_give_the_same_estimates(units, short_scenario):
         assert not np.allclose(slow, expected, rtol=0.1)
 
 
+@pytest.mark.slow
 @needs_gcc
 def test_they_rank_beside_built_in_ones_and_run_again_when_their_files_change(
     units, short_scenario, tmp_path

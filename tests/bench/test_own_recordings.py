@@ -218,6 +218,7 @@ def test_sensitivity_of_a_recording_is_what_methods_are_told_of_the_car(here):
     assert "of a recording are what they were" in str(result.exception)
 
 
+@pytest.mark.slow
 def test_inspection_proposes_a_car_and_says_what_runs_and_what_more_would_need(here):
     result = CliRunner().invoke(application(), ["import", "--inspect", "map.csv"])
     proposal = tomllib.loads(result.stdout)

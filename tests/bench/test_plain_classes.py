@@ -173,6 +173,7 @@ def _run(forms, folder, *names, horizon=0.2):
     return rows[rows["target"] == "mu_front"].set_index("label")
 
 
+@pytest.mark.slow
 def test_whole_recordings_are_enough_and_looking_ahead_is_found(forms, tmp_path):
     names = ("OneByOne", "Whole", "Ahead", "OneSampleAhead", "KnowsTheLength", "Short", "Text")
     rows = _run(forms, tmp_path, *names)
@@ -194,6 +195,7 @@ def test_whole_recordings_are_enough_and_looking_ahead_is_found(forms, tmp_path)
     assert "¶ takes whole recordings: causality checked at random cuts." in board_table(board).notes
 
 
+@pytest.mark.slow
 def test_none_holds_the_last_estimate(forms, tmp_path):
     names = ("Slow", "SlowFromTheStart", "Holds", "OneByOne", "HalfSlow", "Never")
     rows = _run(forms, tmp_path, *names, "NotANumberFirst")
@@ -215,6 +217,7 @@ def test_the_first_estimate_has_to_come_soon(forms, tmp_path):
     )
 
 
+@pytest.mark.slow
 def test_checks_of_one_that_takes_whole_recordings(forms):
     found = check_estimator(f"{forms}:Whole", ("constant_mu",))
     assert failures(found) == {}

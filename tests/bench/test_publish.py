@@ -35,6 +35,7 @@ def cells(path):
         return list(csv.reader(file))
 
 
+@pytest.mark.slow
 def test_a_suite_is_published_with_leaderboard_report_and_manifest(tmp_path):
     suite = tmp_path / "small.toml"
     suite.write_text(SUITE)

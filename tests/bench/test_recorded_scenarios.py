@@ -225,6 +225,7 @@ def test_absent_data_is_a_skipped_row_and_runs_once_it_is_there(tmp_path, monkey
     assert "get it from https://" in line["reason"]
 
 
+@pytest.mark.slow
 def test_a_log_that_is_imported_again_with_other_samples_runs_again(folder, tmp_path):
     def computed():
         plan = plan_of("", [f"recording:{folder}"], [METHOD], "2")

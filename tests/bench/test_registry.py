@@ -96,7 +96,9 @@ def test_an_installed_package_brings_a_method(installed, plugins, tmp_path, shor
     source = (plugins / "faulty.py").read_text(encoding="utf-8")
     installed({"a_plugin.py": source}, "[gripbench.methods]\nsound = a_plugin:Sound\n")
     assert method_names()["sound"] == "entry point a_plugin:Sound"
-    rows = gripbench.run(scenarios=[short_scenario], methods=["sound"], results=tmp_path, workers=1)
+    rows = gripbench.run(
+        scenarios=[short_scenario], methods=["sound"], results=tmp_path / "r", workers=1
+    )
     assert list(rows["status"]) == ["ok"]
 
 

@@ -66,6 +66,7 @@ def test_rounding_below_the_margin_is_no_change(rows):
     assert len(compare(board(rows), board(scaled(rows, "b", 1.0 + 5e-4)), margin=1e-4)) == 2
 
 
+@pytest.mark.slow
 def test_noise_alone_hardly_ever_fails(rows):
     """Runs that all changed by chance: the chance of any regression is that which was stated."""
     base, alarms, trials = board(rows), 0, 60

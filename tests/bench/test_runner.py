@@ -202,6 +202,7 @@ def test_a_moved_project_keeps_its_results(plugin, tmp_path):
     assert choose_method(str(tmp_path / "elsewhere" / "first.py")).digest == first
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")  # joblib's, about the worker that is killed here
 def test_a_killed_worker_process_changes_nothing(short_scenario, tmp_path):
     plan = Plan((find_scenario(short_scenario),), tuple(map(choose_method, METHODS)), range(60))

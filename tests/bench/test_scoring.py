@@ -212,6 +212,7 @@ def test_an_estimate_that_cannot_be_squared_diverges():
         score(*estimates_of(np.full(9, 1e155)), ("mu_front",), a_recording(np.ones(9)))
 
 
+@pytest.mark.slow
 @given(st.integers(0, 10**6), st.floats(0.1, 10.0))
 def test_calibration_against_quadrature_and_counting(seed, deviation):
     """CRPS is the integral of (F(x) - 1[x >= truth])^2; coverage is counted."""
