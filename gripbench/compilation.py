@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterator, Mapping
+from functools import cache
 from types import CodeType, FunctionType
 from typing import Any
 
@@ -57,6 +58,11 @@ def by_channels(choose: Callable[[tuple[str, ...]], Callable[..., Any]]) -> Call
 def _njit(function: Callable[..., Any], **options: Any) -> Any:
     if _declare_only:
         return function
+    return _numba().njit(error_model="numpy", **options)(function)
+
+
+@cache
+def _numba() -> Any:
     import numba  # .4 s
     from numba.core.errors import NumbaExperimentalFeatureWarning
 
@@ -64,7 +70,7 @@ def _njit(function: Callable[..., Any], **options: Any) -> Any:
     warnings.filterwarnings(
         "ignore", "(?s).*considered a subtype", category=NumbaExperimentalFeatureWarning
     )
-    return numba.njit(error_model="numpy", **options)(function)
+    return numba
 
 
 def replacing(function: Any, others: Mapping[Any, Any], name: str) -> Any:

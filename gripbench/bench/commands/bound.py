@@ -99,15 +99,12 @@ def _store(results: Path, seeds: str, workers: int) -> None:
     """Compute and store the bounds of the boards of stored rows."""
     from gripbench.bench.bounds.stored import store_bounds
     from gripbench.bench.catalogue.scenarios import find_scenario
+    from gripbench.bench.commands.rank import stored_rows
     from gripbench.bench.publishing.leaderboard import usual_targets
     from gripbench.bench.ranking.against_bound import wanted_bounds
     from gripbench.bench.running.api import seeds_of
-    from gripbench.bench.running.store import read_rows
-    from gripbench.errors import InputError
 
-    rows = read_rows(results)
-    if rows.empty:
-        raise InputError(f"{results}: no stored rows; 'gripbench run' makes them")
+    rows = stored_rows(results)
     chosen = wanted_bounds(rows, usual_targets(rows), seeds_of(seeds))
     wanted = {name: (find_scenario(name), *each) for name, each in chosen.items()}
     began = time.perf_counter()

@@ -37,18 +37,14 @@ def consistency(
     ] = "terminal",
 ) -> None:
     """Say of each method whether its errors are as large as it says: NEES, NIS, coverage, CRPS."""
-    from gripbench.bench.commands.rank import check_names
+    from gripbench.bench.commands.rank import stored_rows
     from gripbench.bench.publishing.consistency_table import consistency_table
     from gripbench.bench.publishing.leaderboard import usual_targets
     from gripbench.bench.publishing.tables import show
     from gripbench.bench.ranking.consistency import consistency as lines_of
-    from gripbench.bench.running.store import read_rows
     from gripbench.errors import InputError, unknown
 
-    rows = read_rows(results, tuple(scenario or ()))
-    check_names(results, scenario or [], set(rows["scenario"]))
-    if rows.empty:
-        raise InputError(f"{results}: no stored rows; 'gripbench run' makes them")
+    rows = stored_rows(results, scenario or [])
     for name in method or ():
         if name not in set(rows["label"]):
             raise unknown("method", name, set(rows["label"]))

@@ -12,6 +12,8 @@ from gripbench.bench.commands import RANK
 from gripbench.writing import DEFAULT_RESULTS
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from gripbench.bench.ranking.ranking import Board
 
 
@@ -60,13 +62,8 @@ def rank(
     from gripbench.bench.bounds.stored import bounds_beside
     from gripbench.bench.publishing.leaderboard import usual_targets
     from gripbench.bench.ranking.ranking import boards
-    from gripbench.bench.running.store import read_rows
-    from gripbench.errors import InputError
 
-    rows = read_rows(results, tuple(scenario or ()))
-    check_names(results, scenario or [], set(rows["scenario"]))
-    if rows.empty:
-        raise InputError(f"{results}: no stored rows to rank; 'gripbench run' makes them")
+    rows = stored_rows(results, scenario or [])
     found = boards(
         rows,
         target or usual_targets(rows),
@@ -106,12 +103,21 @@ def show_boards(
             show(wins_table(board), format_)
 
 
-def check_names(results: Path, given: list[str], stored: set[str]) -> None:
-    """Raise InputError for a scenario that has no stored rows, or that nobody knows."""
+def stored_rows(results: Path, scenarios: Sequence[str] = ()) -> pd.DataFrame:
+    """Return the stored rows, of all scenarios or of these.
+
+    Raises
+    ------
+    InputError
+        If there are none, of one of these scenarios or at all, or nobody knows a scenario.
+    """
     from gripbench.bench.catalogue.scenarios import all_scenario_files
+    from gripbench.bench.running.store import read_rows
     from gripbench.errors import InputError, unknown
 
-    for name in given:
+    rows = read_rows(results, tuple(scenarios))
+    stored = set(rows["scenario"])
+    for name in scenarios:
         if name in stored:
             continue
         known = all_scenario_files()
@@ -120,3 +126,6 @@ def check_names(results: Path, given: list[str], stored: set[str]) -> None:
         raise InputError(
             f"{results}: no stored rows of '{name}'; 'gripbench run --scenario {name}' makes them"
         )
+    if rows.empty:
+        raise InputError(f"{results}: no stored rows; 'gripbench run' makes them")
+    return rows

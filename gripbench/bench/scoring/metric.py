@@ -20,7 +20,6 @@ from pydantic import Field
 
 from gripbench.bench.scoring.distributions import Innovations, Normal, Quantiles, Stated
 from gripbench.configuration import Configuration
-from gripbench.envs.signals import signal
 from gripbench.errors import GripbenchError, InputError
 
 Floats = npt.NDArray[np.float64]
@@ -230,10 +229,6 @@ class Metric:
             totals, counts = sums[0][known], sums[1][known]
             return self._mean(math.fsum(totals), float(counts.sum()))
         return float(first[known].max() if self.pooling == "maximum" else np.median(first[known]))
-
-    def unit_of(self, target: str) -> str:
-        """Return its SI unit for a target."""
-        return signal(target).unit if self.unit == SIGNAL_UNIT else self.unit
 
 
 def running_total(values: Floats) -> float:

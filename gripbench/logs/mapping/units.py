@@ -9,9 +9,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-import numpy.typing as npt
-
 from gripbench.errors import InputError, unknown
 
 Dimension = tuple[int, int, int, int, int]
@@ -186,14 +183,3 @@ def conversion(unit: str, target: str, per: str = "") -> float:
             f"allowed are {', '.join(fitting)}"
         )
     return given.factor / wanted.factor
-
-
-def to_seconds(values: npt.NDArray[np.float64], unit: str) -> npt.NDArray[np.float64]:
-    """Return times in seconds.
-
-    Raises
-    ------
-    InputError
-        If the unit is not one of time.
-    """
-    return values * conversion(unit, "s")

@@ -13,6 +13,7 @@ from gripbench.bench.running.fitting import fitted
 from gripbench.bench.running.isolation.limits import Limits
 from gripbench.bench.running.recorded_scenarios import on_recording, recording_of
 from gripbench.envs.recordings import Recording
+from gripbench.envs.scenarios import Scenario
 from gripbench.errors import InputError
 from gripbench.writing import DEFAULT_RESULTS
 
@@ -21,15 +22,22 @@ class Runs:
     """A cache of recordings and of what methods make of them."""
 
     def __init__(self) -> None:
+        self._scenarios: dict[str, Scenario] = {}
         self._recordings: dict[tuple[str, int], Recording] = {}
         self._methods: dict[str, MethodSpec] = {}
         self._estimates: dict[tuple[str, str, int], npt.NDArray[Any]] = {}
+
+    def scenario(self, name: str) -> Scenario:
+        """Return a scenario, whose file and population are read and checked once."""
+        if name not in self._scenarios:
+            self._scenarios[name] = find_scenario(name)
+        return self._scenarios[name]
 
     def recording(self, scenario: str, seed: int = 0) -> Recording:
         """Return the recording of a scenario's run."""
         key = (scenario, seed)
         if key not in self._recordings:
-            self._recordings[key] = recording_of(find_scenario(scenario), seed)
+            self._recordings[key] = recording_of(self.scenario(scenario), seed)
         return self._recordings[key]
 
     def method(self, name: str) -> MethodSpec:
@@ -68,7 +76,7 @@ class Runs:
         key = (scenario, method, seed)
         if key not in self._estimates:
             recording = self.recording(scenario, seed)
-            spec = on_recording(self.method(method), find_scenario(scenario))
+            spec = on_recording(self.method(method), self.scenario(scenario))
             channels = tuple(recording.observations.dtype.names or ())
             lacking = missing(spec.declaration, recording.vehicle, channels)
             if lacking:
